@@ -43,7 +43,7 @@ MOST_RIVALS = 3
 
 
 MOST_CHOSEN = 4
-"""Largest number of consecutive chosen drives. If none of them decides, the prediction of their outcome is wrong."""
+"""Largest number of consecutive chosen drives. If none of them decides, the prediction of their results is wrong."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -62,8 +62,6 @@ class LiveDiagnosis:
         Longest stage time [s].
     seed : int
         Seed of the random waveforms.
-    explicit_step : bool
-        As for `diagnose`.
     effects : tuple of Effect classes
         Effects to choose from.
     chooses : bool
@@ -95,7 +93,6 @@ class LiveDiagnosis:
     error_rate: float = ERROR_RATE
     longest: float = LONGEST
     seed: int = 0
-    explicit_step: bool = True
     effects: tuple[type[Effect], ...] = CATALOGUE
     chooses: bool = True
     due: tuple[ProtocolPhase, ...] = ()
@@ -124,7 +121,7 @@ class LiveDiagnosis:
         PiezoError
             As `diagnose` does.
         """
-        found = diagnose(experiment, effects=self.effects, progress=progress, explicit_step=self.explicit_step)
+        found = diagnose(experiment, effects=self.effects, progress=progress)
         time = self.time + sum(p.duration for p in self.due)
         untested = self._untested_by(found, time)
         by_name = probabilities(found, {e.public_name() for e in self.effects}, untested)
@@ -149,15 +146,18 @@ class LiveDiagnosis:
         return self.found.verdict is Verdict.NAMED and " + ".join(self.found.names) == update.likeliest
 
     def reason(self) -> str:
-        """Reason of the end, in one sentence."""
+        """Reason of the end."""
         update = self.updates[-1]
         likeliest = update.likeliest.replace("_", " ")
         share = percent(update.probabilities[update.likeliest])
         if self.end is End.SURE:
-            return f"Stopped after {update.time:.1f} s: {likeliest} has a probability of {share}."
+            return f"Stopped after {update.time:.1f} s: the probability of {likeliest} is {share}."
         if self.end is End.UNDECIDABLE and self.separation is not None:
-            return f"Undecidable within the limits and {self.longest:g} s of stage time. {self.separation.sentence()}"
-        return f"All phases were played ({update.time:.1f} s), and no explanation is certain: {update.sentence()}."
+            return f"No decision is possible within the limits and {self.longest:g} s. {self.separation.sentence()}"
+        return (
+            f"All phases that fit into {self.longest:g} s were played ({update.time:.1f} s), and no explanation is "
+            f"certain: {update.sentence()}."
+        )
 
     def answer(self) -> dict[str, Any]:
         """The part ``live`` of ``answer.json``."""
@@ -234,7 +234,7 @@ def begin(limits: DriveLimits, *, seed: int = 0, **choices: Any) -> LiveDiagnosi
     Parameters
     ----------
     limits, seed, **choices
-        As for `LiveDiagnosis`: ``error_rate``, ``longest``, ``explicit_step``, ``effects``, ``chooses``.
+        As for `LiveDiagnosis`: ``error_rate``, ``longest``, ``effects``, ``chooses``.
 
     Raises
     ------

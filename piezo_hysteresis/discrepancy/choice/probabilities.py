@@ -39,7 +39,7 @@ NOTHING, NONE_OF_THESE = "nothing", "none of these"
 PRIOR_NOTHING, PRIOR_NONE = 0.4, 0.1
 """Prior probabilities that nothing is missing, and that the missing effect is not in the catalogue."""
 ONE_RECORD = 4.0
-"""Largest contribution of one record to the log-odds of two explanations: no record reaches an error rate of 0.5 %."""
+"""Largest contribution of one record to the log-odds of two explanations. An error rate of 0.5 % needs 5.3."""
 
 
 def probabilities(found: Diagnosis, effects: Collection[str], unplayed: Collection[str] = ()) -> dict[str, float]:
@@ -76,7 +76,7 @@ def probabilities(found: Diagnosis, effects: Collection[str], unplayed: Collecti
         last = step is selection.steps[-1]
         if not step.accepted and not (last and not so_far):
             continue
-        shares = turn_probabilities(step, prior, selection.null)
+        shares = step_probabilities(step, prior, selection.null)
         kept = step.best.effect.public_name() if step.accepted else None
         for name, share in shares.items():
             if name != kept:
@@ -92,7 +92,7 @@ def probabilities(found: Diagnosis, effects: Collection[str], unplayed: Collecti
     return _to_one(total)
 
 
-def turn_probabilities(step: Step, prior: Mapping[str, float], null: float) -> dict[str, float]:
+def step_probabilities(step: Step, prior: Mapping[str, float], null: float) -> dict[str, float]:
     """Probability of every explanation in one step of the search.
 
     Parameters
@@ -142,7 +142,7 @@ def tolerant(score: Score) -> Score:
 
 
 def part_explained(before: Score, null: float) -> Score:
-    """Score of a wrong explanation that fits by chance: in every record, the share of the gap needed for a name."""
+    """Score of a wrong explanation that by chance removes, in every record, the share of the gap needed for a name."""
     share = NAMED if before.excess <= FAR else NAMED_FAR
     gap = np.maximum(before.ratios**2 - null, 0.0)
     return Score(np.sqrt(null + (1.0 - share) ** 2 * gap), before.step)

@@ -163,5 +163,5 @@ def spare_drives(limits: DriveLimits, seed: int = 0) -> tuple[ProtocolPhase, ...
 
 
 def whole_plan(limits: DriveLimits, seed: int = 0) -> Protocol:
-    """All tiers as one protocol: the longest one that is played if no rivals remain."""
+    """All tiers as one protocol, which is played completely if no answer is certain before and no drive is chosen."""
     return Protocol("live diagnosis", limits, tuple(p for tier in tiers(limits, seed) for p in tier.phases))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The next drive where two or three rivals remain: the one with the shortest expected time to decide between them."""
+"""The next drive if two or three rivals remain: the one with the shortest expected time to decide between them."""
 
 from __future__ import annotations
 
@@ -66,11 +66,13 @@ class Separation:
         return self.expected_z >= self.needed_z
 
     def sentence(self) -> str:
-        """The separation in one sentence."""
-        names = " and ".join(name.replace("_", " ") for name in self.rivals)
+        """The separation in words."""
+        first, second = (name.replace("_", " ") for name in self.rivals)
+        times = "once" if self.repeats == 1 else f"{self.repeats} times"
         return (
-            f"The best drive for {names} is '{self.drive}', played {self.repeats} times in {self.duration:.1f} s: "
-            f"expected separation z = {self.expected_z:.1f}, needed {self.needed_z:.1f}."
+            f"The best drive to separate {first} from {second} is '{self.drive}', played {times} in "
+            f"{self.duration:.1f} s. It is expected to separate them by {self.expected_z:.1f} standard deviations, and "
+            f"{self.needed_z:.1f} are needed."
         )
 
 

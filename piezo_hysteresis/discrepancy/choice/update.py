@@ -24,8 +24,11 @@ class End(StrEnum):
     """Why a live diagnosis has ended."""
 
     SURE = "sure"
+    """One explanation has at least the probability 1 − error rate, and the rules of the diagnosis agree with it."""
     UNDECIDABLE = "undecidable"
+    """No drive within the limits and the remaining time is expected to separate the rivals."""
     EXHAUSTED = "exhausted"
+    """All phases that fit into the stage time were played, and no explanation is certain."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,11 +39,12 @@ class Correction:
     model : Model or None
         The model with the correction, and its range in the provenance; None if it is refused.
     gain_rate, gain_amplitude : float
-        G with groups of similar rate left out of the fit, and with groups of similar amplitude.
+        Decrease of the mean of ln max(1, R²), with R the error in floors, on groups of similar rate, and on groups of
+        similar amplitude, that were left out of the fit.
     gap : Gap or None
         Error on the test records without and with the correction; None if it was refused before.
     removed : float
-        Share X of the gap on these records that it removes.
+        Share of the gap on these records that it removes.
     refusal : str
         Reason of the refusal; empty if it is accepted.
     """

@@ -15,8 +15,8 @@
 """Errors at rates and amplitudes that were not fitted.
 
 The records are divided into groups of similar rate, and again into groups of similar amplitude. Every group is left out
-once: the parameters are fitted to the other groups and judged on this one. A form with free weights fits only the rates
-in its data, and fails here.
+once: the parameters are fitted to the other groups and judged on this one. A form with many free weights describes only
+the rates in its data, and is rejected.
 """
 
 from __future__ import annotations
@@ -119,7 +119,9 @@ def held_out(model: Model, training_data: TrainingData, correction: str = "") ->
         errors = np.empty(groups.size)
         for group in range(groups.max() + 1):
             kept = groups != group
-            hessian = hessians[kept].sum(axis=0) + np.diag(stiffness)
+            hessian = hessians[kept].sum(axis=0)
+            # with nearly unstable dynamics, rounding may make it negative
+            np.fill_diagonal(hessian, np.maximum(np.diag(hessian), 0.0) + stiffness)
             step = bounded_step(hessian, slopes[kept].sum(axis=0) + stiffness * home, low, high)
             for i in np.flatnonzero(~kept):
                 errors[i] = power[i] + step @ hessians[i] @ step - 2.0 * step @ slopes[i]

@@ -47,13 +47,13 @@ FEW = 10
 """Number of linearisations of a trial; few, because a correction is small and linear in its parameters."""
 
 
-def offered(model: Model, setup: BaselineSetup, null: float) -> Correction | None:
+def best_correction(model: Model, setup: BaselineSetup, null: float) -> Correction | None:
     """The best correction of a fitted model, with the results of its tests.
 
     Parameters
     ----------
     model : Model
-        Fitted model, whose residual has no name.
+        Fitted model, whose residual no effect explains.
     setup : BaselineSetup
         Records and floors.
     null : float
@@ -67,11 +67,15 @@ def offered(model: Model, setup: BaselineSetup, null: float) -> Correction | Non
     if not (setup.test_records and all(g.any() for g in rate_and_amplitude_groups(setup.training_data))):
         return None
     before = held_out(model, setup.training_data)
-    found = [c for form in forms(model, setup.training_data) if (c := tried(model, form, before, setup.training_data))]
+    found = [
+        c
+        for form in forms(model, setup.training_data)
+        if (c := fitted_correction(model, form, before, setup.training_data))
+    ]
     if not found:
         return None
     best = max(found, key=lambda c: min(c.gain_rate, c.gain_amplitude))
-    return best if best.refusal else judged(best, model, setup, null)
+    return best if best.refusal else judged_on_test_records(best, model, setup, null)
 
 
 def forms(model: Model, training_data: TrainingData) -> Iterator[UnnamedCorrection]:
@@ -88,7 +92,9 @@ def forms(model: Model, training_data: TrainingData) -> Iterator[UnnamedCorrecti
     yield UnnamedRelaxation(tau_min=creep["tau_min"], tau_max=creep["tau_max"])
 
 
-def tried(model: Model, form: UnnamedCorrection, before: HeldOut, training_data: TrainingData) -> Correction | None:
+def fitted_correction(
+    model: Model, form: UnnamedCorrection, before: HeldOut, training_data: TrainingData
+) -> Correction | None:
     """A form fitted jointly with the model, and its gain at rates and amplitudes left out; None if the fit fails.
 
     Parameters
@@ -112,15 +118,15 @@ def tried(model: Model, form: UnnamedCorrection, before: HeldOut, training_data:
     axes = [axis for axis, gain in (("rates", by_rate), ("amplitudes", by_amplitude)) if gain < LEAST_GAIN]
     (effect,) = corrections_in(fit.model)
     refusal = (
-        f"a function of the {form.depends_on} lowers mean ln R² by only {min(by_rate, by_amplitude):.2f} at "
-        f"{' and '.join(axes)} that were not fitted, and {LEAST_GAIN:g} is needed"
+        f"a function of the {form.depends_on} reduces the logarithm of the squared error at {' and '.join(axes)} that "
+        f"were not fitted by only {min(by_rate, by_amplitude):.2f} on average, and {LEAST_GAIN:g} is needed"
         if axes
         else ""
     )
     return Correction(effect, model.displacement_scale, None, by_rate, by_amplitude, None, 0.0, refusal)
 
 
-def judged(correction: Correction, model: Model, setup: BaselineSetup, null: float) -> Correction:
+def judged_on_test_records(correction: Correction, model: Model, setup: BaselineSetup, null: float) -> Correction:
     """The correction after the last fit to all samples, judged on the test records."""
     training_data = replace(setup.training_data, records=setup.whole)
     try:
@@ -134,9 +140,13 @@ def judged(correction: Correction, model: Model, setup: BaselineSetup, null: flo
     removed, (effect,) = explained(first, second, null), corrections_in(fit.model)
     found = replace(correction, effect=effect, gap=gap, removed=removed)
     if removed < REMOVES:
-        return replace(found, refusal=f"it removes {100 * removed:.0f} % of the gap on the test records")
+        least = f"at least {100 * REMOVES:g} % is needed"
+        refusal = f"it removes {100 * removed:.0f} % of the gap on the test records, and {least}"
+        return replace(found, refusal=refusal)
     if found.worst > WORSE:
-        return replace(found, refusal=f"it makes a test record worse by {100 * (found.worst - 1.0):.0f} %")
+        most = f"at most {100 * (WORSE - 1.0):.0f} % is allowed"
+        refusal = f"it increases the error of a test record by {100 * (found.worst - 1.0):.0f} %, and {most}"
+        return replace(found, refusal=refusal)
     stated = stating(fit.stated_model, gap.live, setup.span)
     envelope = identified_range(setup.records, setup.fitted)
     return replace(found, model=replace(stated, provenance={**stated.provenance, **envelope}))

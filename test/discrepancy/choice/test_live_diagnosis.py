@@ -85,7 +85,7 @@ def test_effects_that_no_drive_within_the_limits_separates_are_undecidable():
     assert {*last.separation.rivals} == {"sensor_nonlinearity", "softening"}
     assert last.separation.expected_z < last.separation.needed_z
     assert last.answer()["undecidable"]["needed_z"] == last.separation.needed_z
-    assert "Undecidable within the limits and 120 s" in last.reason()
+    assert "No decision is possible within the limits and 120 s" in last.reason()
     (effect,) = last.found.effects()
     assert {effect["name"], *effect["confusable_with"]} == {*last.separation.rivals}
 

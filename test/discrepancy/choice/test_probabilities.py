@@ -27,7 +27,7 @@ from piezo_hysteresis.discrepancy.choice.probabilities import (
     ONE_RECORD,
     log_odds,
     scatter_odds,
-    turn_probabilities,
+    step_probabilities,
 )
 from piezo_hysteresis.discrepancy.choice.rivals import missing_log_odds
 from piezo_hysteresis.discrepancy.choice.tiers import spare_drives, tiers
@@ -77,7 +77,7 @@ def turn(before, *tried):
 
 @given(RATIOS, RATIOS, RATIOS, RATIOS)
 def test_probabilities_sum_to_one_and_none_is_negative(before, first, second, third):
-    told = turn_probabilities(turn(before, (Creep, first), (ThermalDrift, second), (MainsHum, third)), PRIOR, 1.0)
+    told = step_probabilities(turn(before, (Creep, first), (ThermalDrift, second), (MainsHum, third)), PRIOR, 1.0)
     assert math.isclose(sum(told.values()), 1.0, rel_tol=1e-12)
     assert all(p >= 0.0 for p in told.values())
     assert set(told) == set(PRIOR) - {"backlash"}
@@ -85,7 +85,7 @@ def test_probabilities_sum_to_one_and_none_is_negative(before, first, second, th
 
 @given(RATIOS, RATIOS)
 def test_equal_evidence_leaves_the_prior(before, ratios):
-    told = turn_probabilities(turn(before, (Creep, ratios), (ThermalDrift, ratios)), PRIOR, 1.0)
+    told = step_probabilities(turn(before, (Creep, ratios), (ThermalDrift, ratios)), PRIOR, 1.0)
     assert told["creep"] == pytest.approx(told["thermal_drift"])
 
 
@@ -101,7 +101,7 @@ def test_an_error_below_the_floor_is_not_evidence():
 
 
 def test_an_effect_that_explains_too_little_is_less_likely_than_none_of_these():
-    told = turn_probabilities(turn([10.0] * 8, (Creep, [7.0] * 8), (Backlash, [8.0] * 8)), PRIOR, 1.0)
+    told = step_probabilities(turn([10.0] * 8, (Creep, [7.0] * 8), (Backlash, [8.0] * 8)), PRIOR, 1.0)
     assert next(iter(told)) == NONE_OF_THESE
 
 
@@ -146,7 +146,7 @@ def test_equal_rivals_have_zero_expected_separation():
     _, separation = best_drive([first, second], spare_drives(LIMITS)[-2:], missing=5.3, time_left=600.0)
     assert not separation.decides
     assert separation.expected_z == pytest.approx(0.0, abs=1e-3)
-    assert "expected separation z = 0.0, needed 3.3" in separation.sentence()
+    assert "by 0.0 standard deviations, and 3.3 are needed" in separation.sentence()
 
 
 def test_no_drive_is_chosen_that_does_not_fit_into_the_time():

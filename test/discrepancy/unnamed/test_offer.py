@@ -30,7 +30,7 @@ from piezo_hysteresis.discrepancy.search.refit import LAST, joint
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.discrepancy.unnamed.correction import Correction, without_corrections
 from piezo_hysteresis.discrepancy.unnamed.held_out import held_out
-from piezo_hysteresis.discrepancy.unnamed.offer import offered, tried
+from piezo_hysteresis.discrepancy.unnamed.offer import best_correction, fitted_correction
 from piezo_hysteresis.effects import (
     CATALOGUE,
     Arx,
@@ -116,7 +116,7 @@ def of_friction() -> BaselineSetup:
 
 @pytest.fixture(scope="module")
 def found(of_position: BaselineSetup) -> Correction:
-    return offered(of_position.baseline.model, of_position, 1.0)
+    return best_correction(of_position.baseline.model, of_position, 1.0)
 
 
 def test_plays_that_never_move_leave_the_errors_as_they_are(of_position: BaselineSetup) -> None:
@@ -152,7 +152,7 @@ def test_a_correction_is_zero_outside_the_recorded_positions() -> None:
 
 
 def test_friction_of_the_position_is_offered_as_plays(of_friction: BaselineSetup) -> None:
-    found = offered(of_friction.baseline.model, of_friction, 1.0)
+    found = best_correction(of_friction.baseline.model, of_friction, 1.0)
     assert found.accepted and isinstance(found.effect, UnnamedPlays)
     assert found.removed >= 0.5 and found.worst <= 1.05
 
@@ -168,9 +168,9 @@ def test_a_free_filter_bank_fits_well_but_is_refused_at_other_rates(of_friction:
     assert ratios[3:6].mean() < 0.7, "it learns the rate that it is shown"
     assert min(ratios[:3].mean(), ratios[6:].mean()) > 3.0, "and is three times worse at the others"
     errors = held_out(model, data)
-    refused = tried(model, FreeBank(), errors, data)
+    refused = fitted_correction(model, FreeBank(), errors, data)
     assert refused is None or not refused.accepted
-    assert tried(model, UnnamedPlays(reach=0.3), errors, data).accepted
+    assert fitted_correction(model, UnnamedPlays(reach=0.3), errors, data).accepted
 
 
 def test_a_correction_is_never_part_of_naming(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -186,4 +186,4 @@ def test_a_correction_is_never_part_of_naming(monkeypatch: pytest.MonkeyPatch) -
 def test_records_of_one_rate_cannot_accept_a_correction(of_position: BaselineSetup) -> None:
     data = of_position.training_data
     one = replace(data, records=data.records[3:6], floors=data.floors[3:6], alone=())
-    assert offered(of_position.baseline.model, replace(of_position, training_data=one), 1.0) is None
+    assert best_correction(of_position.baseline.model, replace(of_position, training_data=one), 1.0) is None
