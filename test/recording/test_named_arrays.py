@@ -86,6 +86,12 @@ def test_a_capture_with_plain_names_needs_no_mapping(tmp_path):
     assert any("exp.Y.position (um)" in n.message for n in experiment.notices)
 
 
+def test_a_variable_may_state_its_unit_after_the_name_of_its_channel(tmp_path):
+    io.savemat(tmp_path / "m.mat", {"time_ms": 1e3 * TIME, "voltage_mV": 1e3 * VOLTAGE, "displacement_um": MICRONS})
+    (record,) = read(tmp_path / "m.mat", phases="x")
+    assert_is_the_recording(record)
+
+
 def test_one_signal_is_a_struct_and_no_array(tmp_path):
     capture = {"X": signals(("t", "s", TIME)), "Y": signals(("u", "V", VOLTAGE)), "Z": signals(("y", "um", MICRONS))}
     io.savemat(tmp_path / "capture.mat", {"exp": capture})

@@ -41,6 +41,8 @@ _CONSTANT_SPEED = 0.75
 """Share of equal increments from which a drive consists of ramps."""
 _SEVERE_SHARE = 0.05
 """Share of samples from which a defect spoils a phase."""
+_SEVERE_CUT = 0.02
+"""Share of the drive range beyond a clipped extreme from which it spoils a phase, however few its samples."""
 _ALONE = 0.5
 """Largest movement of the displacement just before and after a drop-out, as a share of its jump."""
 _BESIDE = 3
@@ -82,16 +84,18 @@ def _stuck(record: Record) -> list[Notice]:
     beyond = np.maximum(high - np.maximum(first, last), np.minimum(first, last) - low)
     # with backlash a stage also stands still after a turning point of the drive, but not across it
     moved = (high - low > _DRIVE_MOVES * np.ptp(u)) | (at_rail & (beyond > _DRIVE_RETURNS * np.ptp(u)))
-    runs, at_rail = runs[moved], at_rail[moved]
+    runs, at_rail, beyond = runs[moved], at_rail[moved], beyond[moved]
+    cut = bool(beyond[at_rail].max(initial=0.0) > _SEVERE_CUT * np.ptp(u))
     notices = []
-    for kind, part, text in (
-        ("clipped", runs[at_rail], "the displacement is clipped at {:.4g} m"),
-        ("stuck", runs[~at_rail], "the displacement stays at {:.4g} m"),
+    for kind, part, text, spoils in (
+        ("clipped", runs[at_rail], "the displacement is clipped at {:.4g} m", cut),
+        ("stuck", runs[~at_rail], "the displacement stays at {:.4g} m", False),
     ):
         if len(part):
             samples = int((part[:, 1] - part[:, 0]).sum())
             message = text.format(float(y[part[0, 0]])) + f" for {samples} samples while the drive moves"
-            notices.append(Notice(kind, message, record.phase, severe=samples > _SEVERE_SHARE * record.size))
+            severe = spoils or samples > _SEVERE_SHARE * record.size
+            notices.append(Notice(kind, message, record.phase, severe=severe))
     return notices
 
 

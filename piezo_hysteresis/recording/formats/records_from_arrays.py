@@ -56,7 +56,9 @@ def records_from_arrays(
         If voltage or displacement is not found, or they form no record.
     """
     fields = [name.removeprefix(prefix) for name in arrays if name.startswith(prefix)]
-    others = [name for name in (*fields, *options.columns) if is_channel(name)]
+    open_ = [c for c in CHANNELS if c not in options.columns and prefix + c not in arrays]
+    with_unit = {name for name in fields for c in open_ if name.startswith(f"{c}_") and unit_in(name, c)}
+    others = [name for name in (*fields, *options.columns) if is_channel(name) and name not in with_unit]
     given = {c: str(options.columns.get(c, prefix + c)) for c in (*CHANNELS, *others, *LABELS)}
     places = {c: place for c, place in given.items() if c in options.columns or place in arrays}
     labels = {name: _label(arrays[places[name]], places[name]) for name in LABELS if name in places}

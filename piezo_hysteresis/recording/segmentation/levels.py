@@ -35,6 +35,8 @@ _NOISE_WIDTH = 20.0
 """Noise widths within which voltages are one level."""
 _PEAK = 0.5
 """Length of a level over that of the shorter movement beside it, below which it is the top of a wave."""
+_CURVED = 0.25
+"""Difference between the means of both halves of a level, as a share of its range: 0.5 for a parabola, 0 for noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,7 @@ def pieces_of(voltage: Samples) -> list[Piece]:
     length = max(length, int(voltage.size * tolerance / span))  # the slowest drive passes its range once
     levels = _joined(voltage, _levels_of(voltage, _blocks(voltage, length), length, tolerance), 4 * tolerance)
     turns = turning_points(voltage, max(4 * tolerance, 0.01 * span))
-    levels = _without_peaks(levels, turns, voltage.size)
+    levels = _without_peaks(levels, turns, voltage)
     pieces: list[Piece] = []
     end = 0
     for level in levels:
@@ -126,9 +128,13 @@ def _joined(voltage: Samples, levels: list[Piece], tolerance: float) -> list[Pie
     return joined
 
 
-def _without_peaks(levels: list[Piece], turns: NDArray[np.int64], size: int) -> list[Piece]:
-    """Levels that are not short against the movements beside them, up to the next level or turning point."""
+def _without_peaks(levels: list[Piece], turns: NDArray[np.int64], voltage: Samples) -> list[Piece]:
+    """Levels that are not short against the movements beside them, up to the next level or turning point.
+
+    At an end of the record only one movement is known, so that there a short level is a wave only if it is curved.
+    """
     kept = []
+    size = voltage.size
     for i, level in enumerate(levels):
         before = max(int(turns[turns < level.start - 1].max(initial=0)), levels[i - 1].stop if i else 0)
         after = min(
@@ -136,6 +142,14 @@ def _without_peaks(levels: list[Piece], turns: NDArray[np.int64], size: int) -> 
         )
         # the length of a movement at the end of the record is unknown
         moves = [level.start - before] * (before > 0) + [after - level.stop] * (after < size - 1)
-        if level.start == 0 or level.stop == size or level.size >= _PEAK * min(moves, default=0):
+        is_long = level.size >= _PEAK * min(moves, default=0)
+        at_end = level.start == 0 or level.stop == size
+        if is_long or (at_end and not _is_curved(voltage[level.start : level.stop])):
             kept.append(level)
     return kept
+
+
+def _is_curved(level: Samples) -> bool:
+    """Whether the drive moves all the time, as at the top of a wave; a rest with noise does not."""
+    halves = level[: level.size // 2], level[level.size // 2 :]
+    return bool(abs(halves[0].mean() - halves[1].mean()) > _CURVED * np.ptp(level))

@@ -28,6 +28,10 @@ JITTER = 0.02
 """Deviation of the steps from their mean, in sample periods (rms), above which it is reported."""
 
 
+LONGEST_DELAY = 2.5
+"""Step in sample periods up to which it may be a late time, because the times after it are where they would be."""
+WINDOW = 8
+"""Number of times before and after such a step that decide."""
 LARGEST_CONTRADICTION = 0.05
 """Share by which a sample period given by hand may differ from the times of the file."""
 
@@ -91,6 +95,7 @@ class TimeColumn:
         longest = 1.5 * usual if usual > 0 else 3.0 * float(np.min(forward))
         broken = (steps < 0) | (steps > longest)
         if usual > 0:
+            broken &= ~_catches_up(time, steps, usual)
             broken |= steps == 0
         whole = steps[~broken]
         mean = float(whole.mean())
@@ -142,3 +147,15 @@ class TimeColumn:
                 Notice("non_monotonic", f"the time does not increase at {back} places", phase, severe=back > 1)
             )
         return message
+
+
+def _catches_up(time: Samples, steps: Samples, usual: float) -> NDArray[np.bool_]:
+    """Steps after which no sample is missing although they are long: the times of a busy computer scatter."""
+    found = np.zeros(steps.size, np.bool_)
+    late = np.flatnonzero((steps > 1.5 * usual) & (steps < LONGEST_DELAY * usual))
+    around = np.arange(1, WINDOW + 1)
+    for some in np.array_split(late, 1 + late.size // 10_000):
+        before, after = (np.clip(some[:, None] + i, 0, time.size - 1) for i in (1 - around, around))
+        shift = np.median(time[after] - usual * after, axis=1) - np.median(time[before] - usual * before, axis=1)
+        found[some] = shift < 0.5 * usual
+    return found

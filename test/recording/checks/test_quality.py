@@ -144,6 +144,17 @@ def test_a_displacement_at_its_rail_is_clipped(share, top):
     assert notice.severe
 
 
+@pytest.mark.parametrize(("cut", "severe"), [(0.015, False), (0.1, True)])
+def test_a_cut_off_tenth_of_the_stroke_spoils_a_phase_of_which_it_is_little(cut, severe):
+    """Growing sines reach the rail only at the end, in a fiftieth of their samples."""
+    drive = sine() * np.linspace(0.05, 1.0, sine().size)
+    y = stage(drive)
+    rail = y.max() - cut * np.ptp(y)
+    (notice,) = found("clipped", Record(drive, np.minimum(y, rail), PERIOD, "sine_5hz"))
+    assert np.count_nonzero(y > rail) < 0.05 * y.size
+    assert notice.severe is severe
+
+
 def test_a_voltage_that_its_recorder_cuts_off_is_clipped():
     drive = sine()
     record = Record(np.minimum(drive, 5.5), stage(drive), PERIOD, "sine_5hz")

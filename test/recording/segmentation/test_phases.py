@@ -134,6 +134,16 @@ def test_the_flat_tops_of_a_quantised_sine_are_not_holds():
     assert propose(wave, PERIOD) == [(0, "sine_0.5hz")]
 
 
+@pytest.mark.parametrize("frequency", [0.1, 1.0, 10.0])
+@pytest.mark.parametrize("measured_noise", [0.0, 1e-4])
+def test_the_bottom_at_which_a_sine_begins_is_not_a_rest(frequency, measured_noise):
+    wave = 1.0 - np.cos(2 * np.pi * frequency * time(3.0 / frequency))
+    wave += measured_noise * np.random.default_rng(0).normal(size=wave.size)
+    assert propose(wave, PERIOD) == [(0, f"sine_{frequency:g}hz")]
+    after_rest = np.concatenate((np.zeros(wave.size // 10), wave))
+    assert [name for _, name in propose(after_rest, PERIOD)] == ["rest", f"sine_{frequency:g}hz"]
+
+
 @settings(max_examples=30)
 @given(st.lists(st.floats(-10, 10), min_size=1, max_size=300), st.integers(1, 30))
 def test_any_drive_is_covered_from_first_to_last_sample(values, repeat):

@@ -161,6 +161,22 @@ def test_a_gap_in_time_splits_the_record(tmp_path):
     assert any(n.kind == "gap" and "10 samples" in n.message for n in experiment.notices)
 
 
+def test_late_time_stamps_are_no_gaps(tmp_path):
+    """The times of a busy computer scatter by a tenth of the period, and no sample is missing but two."""
+    time = np.arange(4000) * 1e-3
+    stamps = time + 1e-4 * np.random.default_rng(1).normal(size=time.size)
+    assert np.diff(stamps).max() > 1.5e-3
+    rows = np.column_stack((stamps, np.sin(9.0 * time), np.sin(9.0 * time)))
+    there = np.ones(time.size, bool)
+    there[[1700, 3000]] = False
+    np.savetxt(tmp_path / "t.csv", rows[there], delimiter=",", header="time_s,voltage_V,displacement_um", comments="")
+    experiment = read(tmp_path / "t.csv", phases="x")
+    assert [r.size for r in experiment] == [1700, 1299, 999]
+    messages = {n.kind: n.message for n in experiment.notices}
+    assert messages["gap"] == "2 samples are missing in 2 places"
+    assert "time_base" in messages
+
+
 def test_phases_of_a_table_in_one_go_continue(tmp_path):
     rows = "".join(
         f"{t:.6g},{u:.6g},{y:.6g},{'rest' if t < 0.3 else 'triangle'}\n"
