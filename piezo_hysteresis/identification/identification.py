@@ -159,8 +159,7 @@ class Identification:
 
     def response(self, frequency: Samples) -> tuple[np.ndarray, Samples]:
         """G at `frequency` [Hz] and its relative standard error (`response_error`), both of shape (k,)."""
-        arx = self.model[Arx.name]
-        assert isinstance(arx, Arx)
+        arx = self.model.effect(Arx)
         rows = [k for k, name in enumerate(self.fit.names) if name.startswith(f"{Arx.name}.")]
         names, covariance = [self.fit.names[k] for k in rows], self.fit.covariance[np.ix_(rows, rows)]
         error = response_error(self.model, names, covariance, np.asarray(frequency))
@@ -177,8 +176,7 @@ class Identification:
         return html_table(repr(self), ("phase", "% of range", "nm", "data"), rows)
 
     def __str__(self) -> str:
-        arx = self.model[Arx.name]
-        assert isinstance(arx, Arx)
+        arx = self.model.effect(Arx)
         lines = []
         if self.delay is not None:
             lines.append(str(self.delay))

@@ -25,7 +25,7 @@ from ..effects import UnnamedCorrection
 from ..model.model import Model
 from ..parameter import slew_text
 from ..record import Experiment, Notice, Record
-from .records.excitation_content import excitation_content
+from .records.excitation_content import MOVES, excitation_content, moving
 
 LOWEST, HIGHEST = "voltage_min", "voltage_max"
 """Keys of the provenance: voltages [V]."""
@@ -56,12 +56,12 @@ def identified_range(records: Sequence[Record], fitted: Collection[int]) -> Mapp
     """
     chosen = [records[i] for i in fitted]
     voltages = np.concatenate([np.append(r.voltage, r.settled_voltage) for r in chosen])
-    contents = [excitation_content(r) for r in chosen]
+    contents = moving([excitation_content(r) for r in chosen])
     found = {
         LOWEST: voltages.min(),
         HIGHEST: voltages.max(),
         SLOWEST: min((c.slowest for c in contents if c.bandwidth > 0.0), default=0.0),
-        FASTEST: max(c.bandwidth for c in contents),
+        FASTEST: max((c.bandwidth for c in contents), default=0.0),
         STEEPEST: max(_slew_rate(r) for r in chosen),
     }
     return {key: repr(float(f"{number:.6g}")) for key, number in found.items()}
@@ -99,10 +99,11 @@ def _outside_of(model: Model, record: Record) -> Iterator[Notice]:
         known = f"the model was identified from {low:.3g} to {high:.3g} V"
         said = f"the drive goes from {least:.3g} to {most:.3g} V, {known}"
         yield Notice("outside_amplitudes", said, record.phase)
-    if content.bandwidth > FASTER * fastest > 0.0:
+    drive_moves = content.span >= MOVES * (high - low)
+    if drive_moves and content.bandwidth > FASTER * fastest > 0.0:
         said = f"the drive reaches {content.bandwidth:.3g} Hz, the model was identified up to {fastest:.3g} Hz"
         yield Notice("outside_frequencies", said, record.phase)
-    if SLOWER * content.slowest < slowest and content.bandwidth > 0.0:
+    if drive_moves and SLOWER * content.slowest < slowest and content.bandwidth > 0.0:
         said = f"the drive is as slow as {content.slowest:.3g} Hz, the model was identified from {slowest:.3g} Hz"
         yield Notice("outside_frequencies", said, record.phase)
     rate = _slew_rate(record)

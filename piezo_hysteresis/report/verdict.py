@@ -67,7 +67,7 @@ def verdict(comparison: ModelComparison, answer: Mapping[str, Any] | None = None
         )
     if answer is None:
         more = "`piezo diagnose` looks for the missing effect."
-        advice = (more,) if _excess(comparison, now) > ENOUGH else ()
+        advice = () if is_at_floor(comparison, now) else (more,)
         headline = f"The model predicts this experiment to {now.percent:.2g} % of range"
         return VerdictText(headline, (*cautions, *_fit_sentences(comparison, now), *advice))
     said = answer_verdict(answer)
@@ -79,14 +79,14 @@ def answer_verdict(answer: Mapping[str, Any]) -> VerdictText:
     return VerdictText(_headline(answer), _sentences(answer))
 
 
-def _excess(comparison: ModelComparison, now: Errors) -> float:
+def is_at_floor(comparison: ModelComparison, now: Errors) -> bool:
+    """Whether nothing is left but noise: the mean square of error over noise floor is at most `ENOUGH`."""
     ratios = [(row.rms / comparison.floors[row.index]) ** 2 for row in now.judged]
-    return float(sum(ratios) / len(ratios))
+    return bool(sum(ratios) / len(ratios) <= ENOUGH)
 
 
 def _fit_sentences(comparison: ModelComparison, now: Errors) -> tuple[str, ...]:
     before = comparison.before
-    worst = max(now.judged, key=lambda row: row.rms / comparison.floors[row.index])
     floor = 100.0 * comparison.floor / now.range
     sentences = [
         f"In free run the error is {nanometre(now.rms)} rms over all phases, {now.percent:.3g} % of a range of "
@@ -95,14 +95,17 @@ def _fit_sentences(comparison: ModelComparison, now: Errors) -> tuple[str, ...]:
     if before is not None:
         sentences.append(f"Before, it was {nanometre(before.rms)}, {before.percent:.3g} % of range.")
     sentences += _per_record_sentences(comparison)
-    if _excess(comparison, now) <= ENOUGH:
-        sentences.append("This error is at the noise floor: only noise remains.")
-    else:
-        times = worst.rms / comparison.floors[worst.index]
-        sentences.append(
-            f"The error is largest in {worst.phase}: {worst.percent:.3g} % of range, {times:.3g} times its noise floor."
-        )
+    sentences.append(floor_sentence(comparison, now))
     return tuple(sentences)
+
+
+def floor_sentence(comparison: ModelComparison, now: Errors) -> str:
+    """Whether the error is at the noise floor; if not, where it is farthest above it."""
+    if is_at_floor(comparison, now):
+        return "This error is at the noise floor: only noise remains."
+    worst = max(now.judged, key=lambda row: row.rms / comparison.floors[row.index])
+    times = worst.rms / comparison.floors[worst.index]
+    return f"The error is largest in {worst.phase}: {worst.percent:.3g} % of range, {times:.3g} times its noise floor."
 
 
 def _per_record_sentences(comparison: ModelComparison) -> tuple[str, ...]:

@@ -43,6 +43,15 @@ def test_only_a_drive_outside_the_range_is_reported():
     assert slow.message == "the drive is as slow as 0.25 Hz, the model was identified from 1 Hz"
 
 
+def test_a_rest_in_which_the_drive_hardly_moves_shows_no_frequency():
+    drive = 3.0 * (1.0 - np.cos(2.0 * np.pi * TIME))
+    rest, sine_1hz = Record(drive, 1e-6 * drive, 1e-3, "rest").split(40)
+    origin = identified_range((rest, sine_1hz), (0, 1))
+    assert float(origin["frequency_max"]) < 2.0
+    model = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=1.0)), 1e-3, provenance=origin)
+    assert outside(model, Experiment((rest,))) == ()
+
+
 def test_a_stream_is_watched_block_by_block():
     model = Model((BoucWen(),), 1e-3, provenance=identified_range((sine(3.0, 2.0),), (0,)))
     for record, kinds in (

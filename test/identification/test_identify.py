@@ -15,6 +15,7 @@
 """Any mix of records gives a model that predicts data it has not seen, and says what it could not know."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -173,6 +174,17 @@ def test_without_motion_the_error_states_what_is_missing(voltage):
         identify(Experiment((Record(voltage, np.zeros(1000), 1e-3),)))
 
 
+def test_loops_after_a_gap_are_fitted_where_nothing_else_moves():
+    time = 1e-3 * np.arange(6000)
+    stage = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=2.0)), 1e-3, 10.0, 1e-5)
+    voltage = np.concatenate((np.zeros(500), 5.0 - 4.5 * np.cos(2 * np.pi * time)))
+    measured = stage.simulate(Record(voltage, voltage, 1e-3))[0]
+    measured += NOISE * np.random.default_rng(0).standard_normal(voltage.size)
+    rest, _, loops = Record(voltage, measured, 1e-3).split(500, 600)
+    found = identify(Experiment((rest, replace(loops, truncated=True, continues=False))))
+    assert found.free_run_error == pytest.approx(NOISE, rel=0.2)
+
+
 @pytest.mark.parametrize(("size", "gain", "message"), [(1000, 0.0, "never changes"), (5, 1e-6, "got 5 samples in")])
 def test_a_dead_sensor_or_a_few_samples_are_named(size, gain, message):
     voltage = np.linspace(0.0, 9.0, size)
@@ -202,6 +214,24 @@ def test_one_frequency_is_reported_with_the_lag_that_was_found():
     assert "one_frequency" in messages
     value, error = (float(x) for x in re.findall(r"([\d.]+) ms", messages["lag_only"]))
     assert value == pytest.approx(4.0, abs=3 * error)
+
+
+@pytest.mark.parametrize("with_step", [False, True])
+def test_rests_and_steps_have_no_highest_frequency(with_step):
+    """The drive ends at the frequency of the sine, and after a rest it has still only one."""
+    time = 1e-3 * np.arange(4000)
+    slow = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=4.0)), 1e-3, 10.0, 1e-5)
+    swing = np.concatenate((np.full(1000, 5.0), 5.0 + 4.0 * np.sin(2.0 * np.pi * 2.0 * time)))
+    start = np.zeros(600) if with_step else np.linspace(4.96, 5.0, 600)
+    voltage = np.concatenate((start, swing))
+    measured = slow.simulate(Record(voltage, voltage, 1e-3))[0]
+    measured += NOISE * np.random.default_rng(0).standard_normal(voltage.size)
+    records = Record(voltage, measured, 1e-3).split(500, 1600)
+    found = identify(Experiment(records))
+    messages = {n.kind: n.message for n in found.notices}
+    (ends,) = re.findall(r"the drive ends at ([\d.]+) Hz", messages["lag_only"])
+    assert float(ends) == pytest.approx(2.0, rel=0.15)
+    assert ("one_frequency" in messages) is not with_step
 
 
 def test_a_stage_that_lags_by_less_than_a_sample_is_identified():

@@ -24,6 +24,7 @@ from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.effects import Arx, CreepTwoRates, ExtraResonance, HysteresisMemory
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.steps.remaining_lag import lag
 from piezo_hysteresis.identification.structure.left_out import score_left_out
 from piezo_hysteresis.identification.structure.linear_part import fit_structure
 from piezo_hysteresis.identification.structure.piece_fit import best_step, fit_pieces
@@ -123,6 +124,56 @@ def test_a_record_is_cut_by_its_drive():
     assert len({p.amplitude for p in loops}) >= 2
     assert sum(p.record.size for p in pieces) == u.size
     assert all(p.record.continues for p in pieces[1:])
+
+
+@pytest.mark.parametrize("parted", [False, True])
+def test_a_stage_that_rests_before_the_step_rings_as_one_that_begins_with_it(parted):
+    """Also if step and sine are phases of their own, as a drive is divided on reading."""
+    stage = Nanopositioner(mode=300.0)
+    whole = stage.play(np.concatenate((np.zeros(900), growing_sine(1.0, PERIOD))), PERIOD, "sine_1hz")
+    records = whole.split(450, 1600) if parted else (whole,)
+    found = identify(Experiment(records), memory=True)
+    assert found.model[ExtraResonance.name]["f0"] == pytest.approx(300.0, rel=0.005)
+    unseen = Experiment((stage.play(growing_sine(60.0, PERIOD, hold=0.1), PERIOD, "sine_60hz"),))
+    assert max(percents(found.model, unseen)) < 0.65
+
+
+def test_the_lag_of_a_stage_that_rings_too_fast_for_its_samples_is_inside_its_interval():
+    """A mode of 1811 Hz at 2000 samples a second rings at 189 Hz, which no pole and no delay describe."""
+    stage = Nanopositioner(mode=1811.0, zeta=0.043, delay=2.8e-4, pole=1.7e-4)
+    found = identify(played(stage, (1.0,)), memory=True)
+    value, error = lag(found.fit)
+    true = stage.delay + stage.pole + 2.0 * stage.zeta / (2.0 * np.pi * stage.mode) + 0.5 * PERIOD
+    assert abs(value - true) < 1.96 * error < 1e-3
+
+
+@pytest.mark.parametrize("period", [0.05, 1.0])
+def test_drives_of_a_few_millihertz_need_no_mode(period):
+    """Ten times the frequency of such a drive is below the range of a mode."""
+    time = period * np.arange(2000)
+    drives = [5.0 - 4.0 * np.cos(2.0 * np.pi * f / period * time) for f in (0.002, 0.01)]
+    records = [Nanopositioner().play(u, period, f"slow_{k}") for k, u in enumerate(drives)]
+    model = identify(Experiment(tuple(records)), memory=True).model
+    assert ExtraResonance.name not in model
+
+
+def test_one_rate_without_a_step_leaves_creep_in_the_model():
+    """A longer lag has the influence of creep at one rate, but predicts other rates badly."""
+    time = PERIOD * np.arange(4000)
+    swing = np.concatenate([level * (1.0 - np.cos(2.0 * np.pi * time)) for level in (1.0, 2.0, 3.0, 4.0, 5.0)])
+    found = identify(Experiment((STAGE.play(swing, PERIOD, "sine_1hz"),)), memory=True)
+    assert all(j.structure.creep_rates > 0 for j in found.structure.judged)
+    assert {"creep", "creep_two_rates"} & {e.name for e in found.model.effects}
+    faster = Experiment((STAGE.play(swing[::10], PERIOD, "sine_10hz"),))
+    assert max(percents(found.model, faster)) < 0.65
+
+
+def test_a_rest_is_no_loop_that_could_be_left_out():
+    u = np.concatenate((np.zeros(600), growing_sine(10.0, PERIOD, hold=0.0) - 5.0))
+    rest, loops = Nanopositioner().play(u, PERIOD).split(600)
+    kinds = [p.kind for p in pieces_of([rest, loops], [0, 1])]
+    assert kinds[0] is Kind.HOLD
+    assert set(kinds[1:]) == {Kind.LOOP}
 
 
 @pytest.mark.parametrize(("frequency", "percent"), [(1040.0, 0.1), (1400.0, 0.2)])

@@ -49,7 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--choose-orders", action="store_true", help="choose the lowest orders with a good prediction")
     parser.add_argument(
-        "--taps", metavar="N", type=int, help="several axes: length of every impulse response (default: 250)"
+        "--taps", metavar="N", type=int, help="several axes: length of every impulse response [samples] (default: 250)"
     )
     operator = parser.add_mutually_exclusive_group()
     add_operator(operator)
@@ -63,7 +63,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--no-memory",
         action="store_true",
-        help=f"keep the state of the operator even if {MEMORY.name} predicts better",
+        help=f"keep the hysteresis operator even if play operators ({MEMORY.name}) predict better",
     )
     parser.add_argument(
         "--held-out",
@@ -139,7 +139,11 @@ def answer(found: Identification, path: str) -> dict[str, Any]:
         "converged": fit.converged,
         "effects": [e.name for e in found.model.effects],
         "parameters": {
-            name: {"value": value, "interval_95": fit.interval(name), "at_bound": name in fit.at_bounds}
+            name: {
+                "value": value,
+                "interval_95": None if name in fit.at_bounds else fit.interval(name),
+                "at_bound": name in fit.at_bounds,
+            }
             for name, value in fit.values.items()
         },
         "delay_s": None if found.delay is None else found.delay.time,

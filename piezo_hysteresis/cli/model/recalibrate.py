@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         rows = {f"{n}_{u}": getattr(found, n) for n, u in zip(numbers, units, strict=True)}
         write_json(args.json, {"schema": 1, "model": str(path), **rows})
     out = console()
-    out.print("Changes of the model:")
+    out.print("Changes of the model, and its new offset:")
     out.print(f"gain         {100.0 * found.gain:+.3f} %")
     out.print(f"loop height  {100.0 * found.loop_height:+.3f} %")
     out.print(f"lag          {1e6 * found.lag:+.4g} µs")

@@ -31,6 +31,7 @@ from ...report.figures.comparison import ModelComparison, compare
 from ...report.json_file import write_json
 from ...report.tables.error_table import error_table, frequency_table
 from ...report.tables.table import Table
+from ...report.verdict import floor_sentence, is_at_floor
 from ...report.words import describes, error_sentence
 from ..options import reading_options
 from ..options.destination import add_results, require_new_results
@@ -75,7 +76,10 @@ def run(args: argparse.Namespace) -> int:
     show_notices((*experiment.notices, *conditioned, *outside(model, experiment)))
     if args.figures is not None:
         console().print(f"wrote figures to {args.figures}")
-    verdict = f"{error_sentence(now.percent)}{_left(tests)}{_caveats(experiment)}"
+    left = _left(tests)
+    if describes(now.percent) and not (left and is_at_floor(comparison, now)):
+        left = f" {floor_sentence(comparison, now)}{left}"
+    verdict = f"{error_sentence(now.percent)}{left}{_caveats(experiment)}"
     console().print(f"Verdict: {verdict}", style="bold")
     severe = any(notice.severe for notice in experiment.notices)
     return 0 if describes(now.percent) and not severe else 1

@@ -36,6 +36,8 @@ MARKED = 0.95
 """Share of the power of dv/dt that defines bandwidth and number of lines."""
 UNMEASURED = 5e-4
 """Share of the range below which the highest frequencies of a drive are noise of the recorder and not excitation."""
+MOVES = 0.02
+"""Share of the largest range of the drive from which a record shows frequencies; below it is a rest."""
 GAUSSIAN = 1.4826
 """Standard deviation over median absolute value."""
 
@@ -77,6 +79,11 @@ class ExcitationContent:
         return self.bandwidth > SLOW and self.lines >= MANY_LINES and self.moments >= MANY_MOMENTS and not self.waves
 
     @property
+    def is_step(self) -> bool:
+        """True if the drive changes in a few samples only, so that its spectrum has no end."""
+        return self.moments < MANY_MOMENTS
+
+    @property
     def is_slow(self) -> bool:
         """True if the stage follows the drive with only a lag."""
         return self.bandwidth <= SLOW
@@ -99,6 +106,12 @@ def excitation_content(record: Record) -> ExcitationContent:
     moments = min(_spread(speed), _spread(np.diff(speed)))
     waves = is_row_of_waves(record.voltage, record.sample_period, bandwidth)
     return ExcitationContent(span, bandwidth, slowest, lines, moments, noise_of(record), waves)
+
+
+def moving(contents: Sequence[ExcitationContent]) -> list[ExcitationContent]:
+    """Contents of the records whose drive moves noticeably; a rest that ends with the first volts does not."""
+    largest = max((c.span for c in contents), default=0.0)
+    return [c for c in contents if c.span >= MOVES * largest > 0.0]
 
 
 def _excitation(speed: Samples, span: float) -> NDArray[np.complex128]:

@@ -86,7 +86,8 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
             raise RecordError(f"held_out: got every phase ({names}), expected at least one that is fitted")
         out = ()
     left = [i for i in indices if i not in out]
-    fitted = tuple(i for i in left if not is_one_of(i, (CONDITIONING,)) and not experiment[i].truncated) or tuple(left)
+    known = tuple(i for i in left if not is_one_of(i, (CONDITIONING,)) and not experiment[i].truncated)
+    fitted = known if any(contents[i].span > 0.0 for i in known) else tuple(left)
     largest = max((contents[i].span for i in fitted), default=0.0)
     slow = [i for i in fitted if contents[i].is_slow and contents[i].span >= LARGE * largest > 0.0]
     straight = [i for i in fitted if experiment[i].phase.split("_")[0] == "triangle"]

@@ -43,8 +43,7 @@ def loop_of(record: Record, model: Model, weight: float = 1.0) -> Loop:
     weight : float
         Weight in the search.
     """
-    arx = model[Arx.name]
-    assert isinstance(arx, Arx)
+    arx = model.effect(Arx)
     time = record.sample_period * np.arange(record.size)
     y = np.interp(time + arx.group_delay * model.sample_period, time, record.displacement)
     scale = model.voltage_scale

@@ -94,9 +94,7 @@ def with_dynamics(model: Model, arx: Arx) -> Model:
 
 def dynamics_of(model: Model) -> Arx:
     """The linear dynamics in a model."""
-    arx = model[Arx.name]
-    assert isinstance(arx, Arx)
-    return arx
+    return model.effect(Arx)
 
 
 def form_of(model: Model) -> tuple[int, float, tuple[int, int]]:

@@ -20,10 +20,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...effects import Arx
+from ...effects import Arx, ExtraResonance
 from ...record import Notice
 from ..fit.fit import Fit
-from ..records.excitation_content import ExcitationContent
+from ..records.excitation_content import ExcitationContent, moving
 from .linear_start import dynamics_of
 
 ONE_FREQUENCY = 4
@@ -59,19 +59,20 @@ def lag_notices(fit: Fit, contents: Sequence[ExcitationContent], *, rivals_count
         Whether the covariance of the fit includes the influence of other plays and rates of creep on the lag.
     """
     value, error = lag(fit)
-    highest = max(c.bandwidth for c in contents)
+    driven = moving(contents)
+    highest = max([c.bandwidth for c in driven if not c.is_step] or [0.0])
+    ends = f"no record is broadband and the drive ends at {highest:.3g} Hz" if highest else "no record is broadband"
+    besides = " besides the mode" if ExtraResonance.name in fit.model else ""
     notices = [
         Notice(
             "lag_only",
-            f"no record is broadband and the drive ends at {highest:.3g} Hz, so only a lag is "
-            "reported for the dynamics, "
+            f"{ends}, so only a lag is reported for the dynamics{besides}, "
             f"{1e3 * value:.4g} ms ± {1.96e3 * error:.2g} ms (95 %); record noise, a chirp or "
             "steps to identify the dynamics",
         )
     ]
-    moving = [c for c in contents if c.span > 0.0]
-    if max(c.lines for c in moving) <= ONE_FREQUENCY and max(c.bandwidth for c in moving) <= 1.5 * min(
-        c.bandwidth for c in moving
+    if max(c.lines for c in driven) <= ONE_FREQUENCY and max(c.bandwidth for c in driven) <= 1.5 * min(
+        c.bandwidth for c in driven
     ):
         message = "the drive has only one frequency, at which a lag and a narrow backlash look alike; "
         known = "the lag's interval includes both" if rivals_counted else "the lag is less certain than its interval"

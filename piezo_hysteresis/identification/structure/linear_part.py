@@ -26,7 +26,7 @@ from ...record import Notice
 from ..records.excitation_content import excitation_content
 from .piece_fit import DELAY, GAIN, POLE, PieceFit, fit_pieces
 from .pieces import Kind, RecordPiece
-from .ringing import RESOLVED, ringing_frequency
+from .ringing import RESOLVED, SLOWEST, ringing_frequency
 
 LAGS = (0.3, 1.5, 4.0)
 """Start values of the delay [samples]."""
@@ -141,9 +141,11 @@ def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[flo
     fastest = max((excitation_content(r).bandwidth for r in loops), default=0.0)
     top = RESOLVED / min(p.record.sample_period for p in pieces)
     for times in SILENT:
-        if 0.0 < times * fastest < top:
+        if SLOWEST < times * fastest < top:
             mode = ExtraResonance(r=1.0, f0=times * fastest, zeta=SILENT_DAMPING)
             yield fit_structure(plain.model.with_effect(mode), pieces, floors, (SHARE, SHAPE[1]))
+    if top <= SLOWEST:
+        return
     mode = ExtraResonance(r=0.5, f0=top, zeta=SILENT_DAMPING)
     yield fit_structure(plain.model.with_effect(mode), pieces, floors, SHAPE)
 

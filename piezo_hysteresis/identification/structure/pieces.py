@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -35,11 +35,14 @@ AMPLITUDES = 3
 FEWEST = 32
 """Smallest number of samples in a piece."""
 MOST = 24
-"""Number of pieces from which a record is cut into equal pieces instead, because its drive has no single rates."""
+"""Number of pieces from which a record is cut into equal pieces instead, because its drive has no single rates.
+
+With more steps than this, a record is cut by the rates of its drive only.
+"""
 EQUAL = 5
 """Number of equal pieces into which such a record is cut."""
 JUMP = 0.02
-"""A record starts with a step if its first voltage is off the settled level by this share of the drive range."""
+"""A change of the drive between two samples is a step if it is larger than this share of the range, and then held."""
 STILL = 1e-3
 """The drive counts as held while it stays within this share of its range."""
 RINGS = 0.05
@@ -50,9 +53,13 @@ class Kind(StrEnum):
     """What the drive does in a piece."""
 
     STEP = "step"
+    """It jumps, and the stage rings."""
     HOLD = "hold"
+    """It stays at the level of the step, and the stage creeps."""
     LOOP = "loop"
+    """It moves up and down at one rate and amplitude."""
     CONDITIONING = "conditioning"
+    """Anything, in a record that only determines the state of the stage and is not fitted."""
 
 
 WEIGHTS = {Kind.STEP: 0.1, Kind.HOLD: 0.5, Kind.LOOP: 1.0, Kind.CONDITIONING: 0.0}
@@ -87,6 +94,10 @@ class RecordPiece:
     run: int = 0
 
 
+_Edge = tuple[int, Kind, int, int]
+"""End of a piece, what the drive does in it, and the classes of its rate and its amplitude."""
+
+
 def pieces_of(records: Sequence[Record], fitted: Collection[int]) -> list[RecordPiece]:
     """Cut every record into pieces. Records that are not in `fitted` only determine the state of the stage.
 
@@ -103,26 +114,27 @@ def pieces_of(records: Sequence[Record], fitted: Collection[int]) -> list[Record
     for index, record in enumerate(records):
         run += index == 0 or not record.continues
         if index in fitted:
-            found += _cut(record, index, run, largest)
+            before = float(records[index - 1].voltage[-1]) if record.continues and index else record.settled_voltage
+            found += _cut(record, index, run, largest, before)
         else:
             found.append(RecordPiece(record, index, Kind.CONDITIONING, run=run))
-    return found
+    if any(p.kind is Kind.LOOP for p in found):
+        return found
+    # without any loop, the levels of the steps are what can be left out
+    return [replace(p, kind=Kind.LOOP) if p.kind is Kind.HOLD else p for p in found]
 
 
-def _cut(record: Record, index: int, run: int, largest: float) -> list[RecordPiece]:
-    u = record.voltage
-    stop, opening = 0, []
-    if not record.continues and abs(u[0] - record.settled_voltage) > JUMP * largest:
-        moving = np.flatnonzero(np.abs(u - u[0]) > STILL * largest)
-        stop = int(moving[0]) if moving.size else u.size
-        first = min(stop // 4, max(FEWEST, round(RINGS / record.sample_period)))
-        if first >= FEWEST:
-            opening = [(first, Kind.STEP, 0, 0), (stop, Kind.HOLD, 0, 0)]
-        elif length := step_length(record):
-            stop, opening = length, [(length, Kind.STEP, 0, 0)]
-        else:
-            stop = 0
-    edges = opening + [(stop + end, Kind.LOOP, rate, size) for end, rate, size in _loops(record, u[stop:], largest)]
+def _cut(record: Record, index: int, run: int, largest: float, before: float) -> list[RecordPiece]:
+    edges: list[_Edge] = []
+    done = 0
+    for start, ringing, stop in _steps(record, largest, before):
+        edges += _moving(record, done, start, largest)
+        edges.append((ringing, Kind.STEP, 0, 0))
+        if stop > ringing:
+            edges.append((stop, Kind.HOLD, 0, 0))
+        done = stop
+    edges += _moving(record, done, record.size, largest)
+    edges[-1] = (record.size, *edges[-1][1:])
     parts = record.split(*(end for end, *_ in edges[:-1]))
     return [
         RecordPiece(part, index, kind, rate, size, run)
@@ -130,10 +142,39 @@ def _cut(record: Record, index: int, run: int, largest: float) -> list[RecordPie
     ]
 
 
+def _steps(record: Record, largest: float, before: float) -> list[tuple[int, int, int]]:
+    """First sample, end of the ringing and end of the hold of every jump after which the drive is held."""
+    u = record.voltage
+    jumps = np.flatnonzero(np.abs(np.diff(u, prepend=before)) > JUMP * largest)
+    found = []
+    for jump in jumps.tolist():
+        if np.ptp(u[jump : jump + FEWEST]) > 2.0 * STILL * largest:
+            continue
+        leaves = np.abs(u[jump:] - u[jump]) > STILL * largest
+        held = int(leaves.argmax()) if leaves.any() else leaves.size
+        first = min(held // 4, max(FEWEST, round(RINGS / record.sample_period)))
+        if first >= FEWEST:
+            found.append((jump, jump + first, jump + held))
+        if len(found) > MOST:
+            return []
+    if jumps.size and jumps[0] == 0 and (not found or found[0][0] > 0):
+        length = 0 if record.continues else step_length(record)
+        found = [(0, length, length), *(f for f in found if f[0] >= length)] if length else found
+    return found
+
+
+def _moving(record: Record, start: int, stop: int, largest: float) -> list[_Edge]:
+    """Pieces between two steps: a rest, or sections with one rate and one amplitude; none if it is short."""
+    u = record.voltage[start:stop]
+    if u.size < (FEWEST if u.size < record.size else 1):
+        return []
+    if float(np.ptp(u)) <= STILL * largest:
+        return [(stop, Kind.HOLD, 0, 0)]
+    return [(start + end, Kind.LOOP, rate, size) for end, rate, size in _loops(record, u, largest)]
+
+
 def _loops(record: Record, u: Samples, largest: float) -> list[tuple[int, int, int]]:
     """Ends of the sections with one rate and one amplitude, and the classes of both."""
-    if not u.size:
-        return []
     turns = np.empty(u.size, np.int64)
     count = find_turns(u, SWING * largest, False, turns)
     edges = np.concatenate((turns[:count], [u.size - 1]))

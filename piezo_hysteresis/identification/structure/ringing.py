@@ -20,6 +20,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...effects import ExtraResonance
 from ...model.model import Model
 from .pieces import Kind, RecordPiece
 
@@ -27,6 +28,8 @@ CYCLES = 4.0
 """Smallest number of cycles in the piece after the step."""
 RESOLVED = 0.45
 """Highest frequency [cycles per sample]; a faster mode acts as a lag."""
+SLOWEST = next(p.lower for p in ExtraResonance.parameters if p.name == "f0")
+"""Lowest frequency of a mode [Hz]."""
 STANDS_OUT = 10.0
 """Smallest ratio of the highest spectral line to the median of the spectrum, in power."""
 
@@ -54,7 +57,7 @@ def ringing_frequency(model: Model, pieces: Sequence[RecordPiece]) -> float | No
         size = 8 * e.size
         frequency = np.fft.rfftfreq(size, piece.record.sample_period)
         power = np.abs(np.fft.rfft(e, size)) ** 2
-        low, high = CYCLES / piece.record.duration, RESOLVED / piece.record.sample_period
+        low, high = max(CYCLES / piece.record.duration, SLOWEST), RESOLVED / piece.record.sample_period
         band = (frequency > low) & (frequency < high)
         if not band.any():
             continue

@@ -44,7 +44,7 @@ from ..fit.fit import Fit, Progress
 from ..records.conditioning import with_conditioning
 from .linear_part import fit_linear_part, fit_structure, held_by, mode_notices
 from .piece_fit import PieceFit
-from .pieces import RecordPiece, pieces_of
+from .pieces import Kind, RecordPiece, pieces_of
 from .scores import STRUCTURES, Judged, ModelStructure, judge
 from .uncertainty import as_fit, spread_of
 
@@ -77,7 +77,7 @@ class StructureChoice:
         Every structure, best first.
     leads : mapping of str to float
         For every optional effect, the score (mean ln R²) of the best structure without it minus the score of the chosen
-        one; empty if the state of the operator was kept.
+        one, if there are structures without it; empty if the state of the operator was kept.
     notices : tuple of Notice
         ``structure``, ``memory``, ``ringing``.
     """
@@ -114,7 +114,7 @@ def choose_structure(
     progress("structure: effects", 0.4)
     held = held_by(plain)
     full = fit_structure(plain.model.with_effect(MEMORY.level_term()), pieces, sizes, held)
-    judged = sorted(judge(full, pieces, STRUCTURES), key=lambda j: j.score)
+    judged = sorted(judge(full, pieces, _offered(pieces)), key=lambda j: j.score)
     best = judged[0]
     chosen = min((j for j in judged if not j.score > best.score + TIE), key=lambda j: (j.structure.size, j.score))
     progress("structure: fit", 0.7)
@@ -147,8 +147,19 @@ def _leads(chosen: Judged, judged: Sequence[Judged]) -> dict[str, float]:
     for name in chosen.structure.effects:
         family = CREEPS if name in CREEPS else (name,)
         rest = [j.score for j in judged if not set(family) & set(j.structure.effects)]
-        found[name] = min(rest) - chosen.score
+        if rest:
+            found[name] = min(rest) - chosen.score
     return found
+
+
+def _offered(pieces: Sequence[RecordPiece]) -> list[ModelStructure]:
+    """The structures to choose from; without steps, a drive of one rate does not tell creep from a longer lag.
+
+    Every piezo ceramic creeps, and a lag in place of creep grows with the rate, which creep does not.
+    """
+    one_rate = len({p.rate for p in pieces if p.kind is Kind.LOOP}) < 2
+    unknown = one_rate and not any(p.kind is Kind.STEP for p in pieces)
+    return [s for s in STRUCTURES if s.creep_rates > 0 or not unknown]
 
 
 def _with_plays(start: Model, records: Sequence[Record]) -> Model:

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...effects import Creep
+from ...effects import MEMORY, Creep
 from ...errors import IdentificationError
 from ..fit.fit import Fit
 from .linear_part import SHAPE, SHARE
@@ -68,11 +68,13 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
     total = found.total
     counted = [p for p in pieces if p.kind is not Kind.CONDITIONING]
     inverse = _inverse(found)
-    # the residual is a model error, not noise, so a piece of n samples counts as √n independent samples
+    # the residual is a model error, not noise, so a piece of n samples counts as √n independent samples; what is left
+    # after a step beyond the noise is one error, such as the ringing of a mode too fast for the sample period
     meat = np.zeros_like(total[:-1, :-1])
     left = found.squares
     for weight, square, matrix, piece in zip(found.weights, left, found.matrices, counted, strict=True):
-        meat += weight**2 * square / np.sqrt(piece.record.size) * matrix[:-1, :-1]
+        misfit = max(square - 1.0, 0.0) if piece.kind is Kind.STEP else 0.0
+        meat += weight**2 * (square / np.sqrt(piece.record.size) + misfit) * matrix[:-1, :-1]
     if DELAY in found.names:
         delay = found.names.index(DELAY)
         spread = spread.copy()
@@ -113,10 +115,14 @@ def _open_forms(found: PieceFit) -> float:
 
 
 def _inverse(found: PieceFit) -> Array:
-    """Inverse of the normal equations in the free directions; parameters at a bound stay there."""
+    """Inverse of the normal equations in the free directions.
+
+    Plays without weight stay without it. Any other parameter at a bound is as uncertain as if it had no bound.
+    """
     directions = free_directions(found)
     low, high = found.box()
-    stuck = (low >= 0.0) | (high <= 0.0)
+    weights = np.array([n.startswith(f"{MEMORY.name}.c[") for n in found.names], dtype=bool)
+    stuck = ((low >= 0.0) | (high <= 0.0)) & np.pad(weights, (0, low.size - weights.size))
     directions = directions[:, ~np.any(directions[stuck] != 0.0, axis=0)]
     hessian = directions.T @ found.total[:-1, :-1] @ directions
     scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
