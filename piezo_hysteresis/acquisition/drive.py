@@ -54,8 +54,11 @@ class EventKind(Enum):
     """What can happen to a phase within a block."""
 
     BEGAN = "began"
+    """The next sample is the first one of the phase."""
     DONE = "done"
+    """The waveform of the phase was played to its end."""
     STOPPED = "stopped"
+    """The waveform of the phase was ended before its last sample."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,11 +38,31 @@ It is four thirds of the largest step of the identification protocols (0.3 of th
 DRIVER: tuple[Row, ...] = (
     Setting("stage", "simulated", "back end", tuple(BACK_ENDS)),
     Setting("autostart", True, "configure and activate at start"),
-    Parameter("sample_period", "T_s", "s", 0.0, 0.0, 10.0, "time between samples; 0: the stage's own", _SOURCE),
+    Parameter(
+        "sample_period", "T_s", "s", 0.0, 0.0, 10.0, "time between samples; 0: the default of the stage", _SOURCE
+    ),
     Parameter("block_duration", "T_b", "s", 0.01, 1e-3, 1.0, "time covered by one message of samples", _SOURCE),
     Parameter("live_rate", "f_l", "Hz", 50.0, 0.1, 1000.0, "rate of voltage, displacement and live", _SOURCE),
-    Parameter("voltage_min", "u_min", "V", 0.0, -1e4, 1e4, "lowest drive voltage; both 0: the stage's", _SOURCE),
-    Parameter("voltage_max", "u_max", "V", 0.0, -1e4, 1e4, "highest drive voltage; both 0: the stage's", _SOURCE),
+    Parameter(
+        "voltage_min",
+        "u_min",
+        "V",
+        0.0,
+        -1e4,
+        1e4,
+        "lowest drive voltage; if both limits are 0, those of the stage apply",
+        _SOURCE,
+    ),
+    Parameter(
+        "voltage_max",
+        "u_max",
+        "V",
+        0.0,
+        -1e4,
+        1e4,
+        "highest drive voltage; if both limits are 0, those of the stage apply",
+        _SOURCE,
+    ),
     Parameter(
         "max_slew_rate", "S_max", "V/s", 0.0, 0.0, 1e12, "steepest drive; 0: 0.4 of the range per sample", _SOURCE
     ),
@@ -61,7 +81,7 @@ DRIVER: tuple[Row, ...] = (
     ),
     Parameter("command_max_age", "T_c", "s", 2.0, 0.0, 1e6, "largest age of a command that is played", _SOURCE),
     Parameter(
-        "claim_timeout", "T_o", "s", 10.0, 0.5, 600.0, "time without a renewal after which a claim ends", _SOURCE
+        "claim_timeout", "T_o", "s", 10.0, 2.0, 600.0, "time without a renewal after which a claim ends", _SOURCE
     ),
     Parameter(
         "real_time_factor", "κ", "1", 1.0, 0.01, 1000.0, "speed of a simulated or replayed stage; 1: real time", _SOURCE

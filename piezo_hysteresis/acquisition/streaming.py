@@ -90,7 +90,7 @@ class StreamingAcquisition:
         self._latch = StopLatch() if latch is None else latch
         self._keeper = NoKeeper() if keeper is None else keeper
         self._access = threading.Lock()
-        self._halting = threading.Event()
+        self._ending, self._halting = threading.Event(), threading.Event()
         self._safe = threading.Event()
         self._thread = threading.Thread(target=self._run, name="acquisition", daemon=True)
 
@@ -159,6 +159,7 @@ class StreamingAcquisition:
             return True
         if not self._halting.is_set():
             self._safe.clear()
+            self._ending.set()
             self.cancel()
             self._safe.wait(timeout)
         reached = self._safe.is_set()
@@ -174,7 +175,9 @@ class StreamingAcquisition:
     def _run(self) -> None:
         try:
             while not self._ready():
-                if self._halting.wait(0.01):
+                if self._ending.wait(0.01):
+                    self._go_safe()
+                    self._safe.set()
                     return
             self._time_base.anchor(0, *read_together(self._node_clock))
             while not self._halting.is_set():

@@ -19,6 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from piezo_hysteresis.acquisition.claim import Claim
+from piezo_hysteresis.acquisition.settings import DRIVER
 from piezo_hysteresis.errors import StageError
 
 NAMES = st.sampled_from(["a", "b", "c.1"])
@@ -59,3 +60,14 @@ def test_a_claim_changes_hands_only_when_it_was_given_up_or_has_expired(asked):
 def test_a_name_that_could_not_stand_in_a_command_is_refused(name):
     with pytest.raises(StageError, match="expected 1 to 64"):
         Claim(1.0).take(name, 0.0)
+
+
+@given(st.lists(st.floats(0.0, 0.5), min_size=1, max_size=40))
+def test_the_shortest_time_out_keeps_a_claim_that_is_renewed_twice_a_second(late):
+    shortest = next(row.lower for row in DRIVER if row.name == "claim_timeout")
+    claim, now = Claim(shortest), 0.0
+    claim.take("a", now)
+    for delay in late:
+        now += 0.5 + delay
+        assert not claim.has_expired(now)
+        assert claim.renew("a", now)

@@ -21,12 +21,14 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from subprocess import PIPE
 
 import numpy as np
 import pytest
 
-from benchmarks.wire import PERIOD, RAMP, SAFE_WITHIN, check_wire, device, driver_process
+from benchmarks.wire import PERIOD, RAMP, SAFE_WITHIN, SLEW, TOP, check_wire, device, driver_process
 from piezo_hysteresis.stage.back_ends import BACK_ENDS
+from piezo_hysteresis.stage.opening import Opening
 
 pytestmark = pytest.mark.device
 
@@ -104,6 +106,49 @@ def test_a_driver_whose_keeper_is_killed_ends_safe(tmp_path):
         assert "the keeper of the stage has ended" in (tmp_path / "log").read_text()
         assert abs(amplifier.output) <= SAFE_WITHIN
         check_wire(amplifier.wire)
+
+
+@contextmanager
+def keeper_of_a_held_voltage():
+    """A keeper that is ready, and the amplifier of its stage, whose driver has left it at 3 V."""
+    with device("gcs2") as (word, parameters, amplifier, _):
+        stage = BACK_ENDS[word].open(parameters, Opening(PERIOD))
+        stage.set_voltage(3.0)
+        limits = {"voltage_min": 0.0, "voltage_max": TOP, "max_slew_rate": SLEW}
+        order = {"stage": word, "values": parameters, "sample_period": PERIOD, "limits": limits, "ramp_rate": RAMP}
+        order |= {"timeout": 60.0, "ends_driver": False, "driver": 0}
+        command = [sys.executable, "-m", "piezo_hysteresis.acquisition.safety.keeper"]
+        with subprocess.Popen(command, stdin=PIPE, stdout=PIPE, stderr=PIPE) as keeper:
+            try:
+                keeper.stdin.write(json.dumps(order).encode() + b"\n")
+                keeper.stdin.flush()
+                assert keeper.stdout.readline() == b"ready\n"
+                stage.leave()
+                assert abs(amplifier.output - 3.0) <= SAFE_WITHIN
+                yield keeper, amplifier
+            finally:
+                keeper.kill()
+
+
+def test_a_keeper_acts_also_when_nobody_reads_its_messages_any_more():
+    """The terminal or the launch program of a driver may end together with it."""
+    with keeper_of_a_held_voltage() as (keeper, amplifier):
+        keeper.stderr.close()
+        keeper.stdout.close()
+        keeper.stdin.close()
+        keeper.wait(30.0)
+        assert abs(amplifier.output) <= SAFE_WITHIN
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
+def test_a_keeper_that_is_asked_to_end_still_watches_its_driver(number):
+    """A service manager or a terminal asks the whole group of the driver, which may be unable to act."""
+    with keeper_of_a_held_voltage() as (keeper, amplifier):
+        keeper.send_signal(number)
+        time.sleep(0.1)
+        keeper.stdin.close()
+        assert keeper.wait(30.0) == 0
+        assert abs(amplifier.output) <= SAFE_WITHIN
 
 
 @pytest.mark.parametrize("sent", [b"", b"order"])

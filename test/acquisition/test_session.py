@@ -20,9 +20,10 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks.wire import LSB, SAFE_WITHIN, WiredSession, check_wire, device
+from benchmarks.wire import LSB, SAFE_WITHIN, WiredSession, check_wire, device, settings, values
 from piezo_hysteresis.acquisition.session import DriverSession
 from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.record import Record
 from piezo_hysteresis.stage.daqmx.tasks import DaqmxError
 from piezo_hysteresis.stage.gcs2.connection import Gcs2Error
 
@@ -48,7 +49,7 @@ def test_a_stage_that_its_driver_cannot_make_safe_is_left_to_the_keeper(word, mo
             raise (Gcs2Error if word == "gcs2" else DaqmxError)("the fault that was asked for")
 
         monkeypatch.setattr(s.session.stage, "_go", fails)
-        monkeypatch.setattr(s.session.stage._limiter, "way", lambda *_: fails(0.0), raising=False)
+        monkeypatch.setattr(s.session.stage._limiter, "ramp", lambda *_: fails(0.0))
         with pytest.raises(StageError, match=r"fault that was asked for; .*its keeper then brought it to its safe"):
             s.session.close()
         assert abs(s.output) <= SAFE_WITHIN
@@ -154,3 +155,14 @@ def test_a_thread_that_hangs_ends_the_heartbeats(monkeypatch):
         s.wait(lambda: s.failures, "the end of the driver")
         s.end()
         check_wire(s.wire)
+
+
+def test_a_replay_that_waits_for_subscribers_ends_at_once():
+    record = Record(np.linspace(0.0, 5.0, 5000), np.zeros(5000), 1e-3, "noise")
+    given = values("replay", experiment="recording", subscribers=1)
+    session = DriverSession(settings("replay", sample_period=0.0), given, "test replay", lambda path: (record,))
+    failures = []
+    acquisition = session.start(time.time_ns, lambda delivery: None, failures.append, lambda: 0)
+    session.close()
+    assert not acquisition.is_running
+    assert not failures

@@ -32,7 +32,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from ...errors import PiezoError
+from ...errors import PiezoError, reason_of
 from ...stage.back_ends import BACK_ENDS
 from ...stage.opening import Opening
 from ...stage.stage import Stage
@@ -55,7 +55,8 @@ _BETWEEN_ATTEMPTS = 0.2
 
 def main() -> int:
     """Run the keeper of one stage. Returns 1 if it could not open the stage or make it safe, otherwise 0."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the driver itself makes the stage safe and ends the keeper
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # the driver itself makes the stage safe and ends the keeper
     line = sys.stdin.readline()
     if not line:
         return 0  # the driver ended before it named the stage
@@ -74,9 +75,9 @@ def main() -> int:
         os._exit(0)  # closing the stage would move it
     with suppress(BrokenPipeError):
         print(ACTING, flush=True)  # noqa: T201  # a driver that continues after a silence must not use the stage
-    sys.stderr.write(f"keeper: {reason}; bringing {stage.description.name} to its safe voltage\n")
+    _report(f"{reason}; bringing {stage.description.name} to its safe voltage")
     if order["ends_driver"] and reason != _HANDED_OVER:
-        with suppress(ProcessLookupError):
+        with suppress(OSError):  # the driver has ended, and its number may belong to another process
             os.kill(order["driver"], signal.SIGKILL)
     return _make_safe(stage, order)
 
@@ -109,13 +110,19 @@ def _make_safe(stage: Stage, order: Mapping[str, Any]) -> int:
             if order["ends_driver"]:  # only the driver had used the device: read the present voltage first
                 stage = _opened(order)
             stage.safe()
-        except PiezoError as error:
-            sys.stderr.write(f"keeper: {' '.join(str(error).split())}\n")
+        except Exception as error:  # whatever failed, the next attempt may reach the safe voltage
+            _report(reason_of(error))
             time.sleep(_BETWEEN_ATTEMPTS)
         else:
-            sys.stderr.write(f"keeper: {stage.description.name} is at its safe voltage\n")
+            _report(f"{stage.description.name} is at its safe voltage")
             return 0
     return 1
+
+
+def _report(text: str) -> None:
+    """Write a line to stderr, which is lost if the terminal or the program that reads it has ended, too."""
+    with suppress(OSError):
+        sys.stderr.write(f"keeper: {' '.join(text.split())}\n")
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ import threading
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
+from typing import IO, Any, cast
 
 from ...errors import StageError
 from ...stage.back_ends import BACK_ENDS
@@ -105,8 +105,10 @@ class KeeperLink:
             stdout=subprocess.PIPE,
             start_new_session=True,  # a signal to the driver's process group must not end its keeper
         )
-        assert self._process.stdin is not None
-        self._pipe = self._process.stdin.fileno()
+        # Popen types its pipes as optional; with PIPE both exist
+        self._orders = cast(IO[bytes], self._process.stdin)
+        self._answers = cast(IO[bytes], self._process.stdout)
+        self._pipe = self._orders.fileno()
         answer = self._started(json.dumps(order))
         if answer != READY:
             self._process.kill()
@@ -126,8 +128,7 @@ class KeeperLink:
 
     def _has_spoken(self) -> bool:
         """Whether the keeper has sent a message (it acts) or has ended."""
-        assert self._process.stdout is not None
-        return bool(select.select([self._process.stdout], [], [], 0.0)[0])
+        return bool(select.select([self._answers], [], [], 0.0)[0])
 
     def begin_step(self) -> None:
         """Begin a step of the acquisition: from now on, heartbeats are sent for `patience` and no longer."""
@@ -202,16 +203,13 @@ class KeeperLink:
         self._send(last)
 
     def _close_pipes(self) -> None:
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                pipe.close()
+        self._orders.close()
+        self._answers.close()
 
     def _started(self, order: str) -> str:
-        out = self._process.stdout
-        assert out is not None
         self._send(f"{order}\n".encode())
-        ready, _, _ = select.select([out], [], [], _START)
-        return out.readline().decode(errors="replace").strip() if ready else f"no answer within {_START:g} s"
+        ready, _, _ = select.select([self._answers], [], [], _START)
+        return self._answers.readline().decode(errors="replace").strip() if ready else f"no answer within {_START:g} s"
 
     def _beat(self) -> None:
         while not self._ended.wait(self._interval):

@@ -42,21 +42,26 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--server", metavar="HOST:PORT", default="", help="NI gRPC device server (default: this machine)"
     )
-    parser.add_argument("--wired-output", metavar="NAME", default=default.output, help=f"default: {default.output}")
+    parser.add_argument(
+        "--wired-output",
+        metavar="NAME",
+        default=default.output,
+        help=f"analogue output that is wired (default: {default.output})",
+    )
     parser.add_argument(
         "--wired-input",
         metavar="NAME",
         default=default.displacement_input,
-        help=f"default: {default.displacement_input}",
+        help=f"analogue input that is wired (default: {default.displacement_input})",
     )
     parser.add_argument(
         "--sample-period",
         metavar="S",
         type=float,
         default=default.sample_period,
-        help=f"default: {default.sample_period}",
+        help=f"time between samples [s] (default: {default.sample_period})",
     )
-    parser.add_argument("--amplitude", metavar="V", type=float, default=1.0, help="peak of the noise (default: 1)")
+    parser.add_argument("--amplitude", metavar="V", type=float, default=1.0, help="peak of the noise [V] (default: 1)")
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="parameter file to write")
     add_force(parser)
     parser.set_defaults(run=run)

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import threading
 
@@ -52,14 +53,18 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="gcs2: a PI GCS 2.0 controller; nidaqmx: an NI gRPC device server with a card",
     )
     defaults = ", ".join(f"{port} for {device}" for device, port in _PORT.items())
-    parser.add_argument("--host", default="127.0.0.1", help="address to listen at (default: this machine only)")
+    parser.add_argument("--host", default="127.0.0.1", help="address for connections (default: this machine only)")
     parser.add_argument("--port", type=int, help=f"TCP port, 0 for any free one (default: {defaults})")
     add_plant_arguments(parser)
     parser.add_argument(
-        "--servo-time", metavar="S", type=float, default=50e-6, help="servo time of gcs2 [s] (default: 5e-05)"
+        "--servo-time", metavar="S", type=float, default=50e-6, help="gcs2: servo time [s] (default: 5e-05)"
     )
     parser.add_argument(
-        "--command-per-volt", metavar="C", type=float, default=1.0, help="of gcs2: open-loop command over piezo volt"
+        "--command-per-volt",
+        metavar="C",
+        type=float,
+        default=1.0,
+        help="gcs2: open-loop command over piezo voltage (default: 1)",
     )
     parser.add_argument(
         "--fault", action="append", default=[], metavar="FAULT", help="fault to inject, see below (repeatable)"
@@ -82,7 +87,8 @@ def run(args: argparse.Namespace) -> int:
     server: Gcs2Server | DaqmxServer
     if args.device == "gcs2":
         faults = [GCS2_FAULTS.parse(text) for text in args.fault]
-        controller = Controller(stage, serial=str(args.seed), command_per_volt=args.command_per_volt, faults=faults)
+        serial = f"{args.seed}-{os.getpid()}"  # drivers take two controllers with one serial number for one device
+        controller = Controller(stage, serial=serial, command_per_volt=args.command_per_volt, faults=faults)
         server = Gcs2Server(controller, args.host, port)
     else:
         server = DaqmxServer(Card(stage, faults=[NI_FAULTS.parse(text) for text in args.fault]), args.host, port)

@@ -25,16 +25,16 @@ from typing import Any
 from ...acquisition.session import DriverSession
 from ...acquisition.settings import DriverSettings
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-"""Signals that end a command."""
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals that end a command; SIGHUP is sent when the terminal is closed."""
 
 
 @contextmanager
 def safe_session(settings: DriverSettings, values: Mapping[str, Any], place: str) -> Iterator[DriverSession]:
     """Open a session for the block, and bring its stage to the safe voltage at the end.
 
-    The first SIGINT or SIGTERM raises KeyboardInterrupt in the block. After it, and while the session closes, both
-    signals are ignored, because they would interrupt the ramp to the safe voltage.
+    The first of `_SIGNALS` raises KeyboardInterrupt in the block. After it, and while the session closes, all of them
+    are ignored, because they would interrupt the ramp to the safe voltage.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ from rclpy.parameter import Parameter
 from ...acquisition.safety.stop_latch import StopLatch
 from ...acquisition.session import DriverSession
 from ...acquisition.settings import DRIVER, IN_FORCE, DriverSettings
-from ...errors import ParameterError, PiezoError, reason_of
+from ...errors import ParameterError, PiezoError, StageError, reason_of
 from ...record import Record
 from ...stage.back_ends import BACK_ENDS
 from ..messages.frame import frame_name
@@ -122,10 +122,12 @@ class DriverNode(GuardedNode, LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to publish samples."""
-        done = super().on_activate(state)
-        assert self._session is not None and self._topics is not None
-        self._failure = None
         topics, session = self._topics, self._session
+        if topics is None or session is None:
+            self._report_failure(StageError("activate: got no open stage, expected one; configure the driver first"))
+            return TransitionCallbackReturn.FAILURE
+        done = super().on_activate(state)
+        self._failure = None
         acquisition = session.start(lambda: now(self), topics.deliver, self._fail, lambda: topics.subscribers)
         self._diagnostics.watch(acquisition, session.settings.real_time_factor / session.sample_period)
         self._diagnostics.state(DiagnosticStatus.OK, "streaming", session.limits.name)

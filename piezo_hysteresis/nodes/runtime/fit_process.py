@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 from .job_process import Exchange, JobProcess, Report
 
@@ -45,11 +46,12 @@ class Outcome:
     conclusion: str = field(default="", kw_only=True)
 
 
-Job = Callable[[Path, str, Report], Outcome]
+Found = TypeVar("Found", bound=Outcome)
+Job = Callable[[Path, str, Report], Found]
 """Function of the path of the data, the text of the present model, and a callback for progress."""
 
 
-class FitProcess(JobProcess[Outcome]):
+class FitProcess(JobProcess[Found]):
     """One fit, from its start to its outcome. Its process ends when this process ends.
 
     Parameters
@@ -62,9 +64,9 @@ class FitProcess(JobProcess[Outcome]):
         Text of a model file, or empty.
     """
 
-    def __init__(self, job: Job, path: Path, model: str = "") -> None:
+    def __init__(self, job: Job[Found], path: Path, model: str = "") -> None:
         super().__init__("fit", _fit, job, path, model)
 
 
-def _fit(exchange: Exchange, job: Job, path: Path, model: str) -> Outcome:
+def _fit(exchange: Exchange, job: Job[Found], path: Path, model: str) -> Found:
     return job(path, model, exchange.report)

@@ -79,9 +79,9 @@ def run(
 
 
 def run_together(lives: Sequence[NodeLife[Any]], arguments: Sequence[str] | None = None) -> int:
-    """Make nodes and spin them in one thread until SIGINT or SIGTERM.
+    """Make nodes and spin them in one thread until SIGINT, SIGTERM or SIGHUP (the terminal was closed).
 
-    The handlers of rclpy would invalidate the context at once. Here both signals only end the spinning, further signals
+    The handlers of rclpy would invalidate the context at once. Here the signals only end the spinning, further signals
     are ignored, and `end` can still publish and serve. An exception of a callback is reported, and the node continues.
 
     Parameters
@@ -130,8 +130,9 @@ def _signalled() -> Future:
     stop = Future()
     ours, theirs = socket.socketpair()
     theirs.setblocking(False)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: None)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:  # nohup ignores it on purpose
+            signal.signal(number, lambda *_: None)
     signal.set_wakeup_fd(theirs.fileno())
 
     def wait() -> None:

@@ -53,6 +53,21 @@ def test_a_process_that_is_a_device(device):
         assert process.wait() == 0
 
 
+def test_two_controllers_at_a_time_are_two_devices():
+    command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "emulate", "gcs2", "--port", "0"]
+    processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    names = set()
+    for process in processes:
+        with process:
+            try:
+                stage = opened("gcs2", int(re.search(r"127\.0\.0\.1:(\d+)", process.stdout.readline())[1]))
+                names.add(stage.description.name)
+                stage.close()
+            finally:
+                process.send_signal(signal.SIGINT)
+    assert len(names) == 2, "a driver would take the second one for a device that has a driver already"
+
+
 @pytest.mark.parametrize(
     "words",
     [

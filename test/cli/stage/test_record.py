@@ -128,7 +128,7 @@ def test_ctrl_c_brings_the_stage_to_safety_with_a_message(piezo, tmp_path, monke
     assert not folder.exists()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_more_signals_on_the_way_to_safety_are_ignored(piezo, tmp_path, monkeypatch, number):
     file = tmp_path / "stage.yaml"
     file.write_text(STAGE.format(memory="false"))

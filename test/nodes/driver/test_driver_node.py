@@ -55,7 +55,7 @@ def test_hold_timeout_leads_to_the_safe_voltage(lab):
     assert samples.steepest(PERIOD) <= 1 / (999 * PERIOD) * (1 + 1e-6)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
 def test_a_signal_ramps_to_the_safe_voltage(lab, number):
     driver = lab.driver(fresh=True, **IDEAL)
     samples = lab.streaming()
