@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..blocks.block import Block, State
+from ..blocks.inverses.held_deviation import HeldDeviation
 from ..blocks.inverses.inverted_block import InvertedBlock
 from ..blocks.inverses.linear_inverse import InvertedLinear
 from ..c_form import CForm
@@ -74,7 +75,7 @@ class Inverse:
         Low-pass filter of the wanted displacement. Default: no filter; the fast parts of a path may then need very high
         voltages.
     approximate : bool
-        Leave out effects that cannot be inverted instead of refusing the model.
+        Leave out effects that cannot be inverted instead of refusing the model; see `HeldDeviation`.
 
     Attributes
     ----------
@@ -134,7 +135,9 @@ class Inverse:
         numbered = list(zip(numbers, kept.blocks, strict=True))
         self._before, after = numbered[: len(terms)], numbered[len(terms) :]
         own = [(k, _inverted(b, self.chain.labels[k])) for k, b in after]
-        inverted: list[tuple[int | None, InvertedBlock]] = [(k, stage) for k, stage in own[::-1] if stage is not None]
+        own += [(k, HeldDeviation(b)) for k, b in enumerate(self.chain.blocks) if self.chain.labels[k] in impossible]
+        own.sort(key=lambda item: -item[0])
+        inverted: list[tuple[int | None, InvertedBlock]] = [(k, stage) for k, stage in own if stage is not None]
         if band is not None:
             inverted.insert(0, (None, band.stage(self.sample_period)))
         self._stages = inverted
@@ -154,7 +157,11 @@ class Inverse:
         return self.resume(self.chain.rest(voltage, time))
 
     def resume(self, state: ChainState) -> InverseState:
-        """State of the inverse for a stage whose model is in `state`; the dynamics are taken as settled."""
+        """State of the inverse for a stage whose model is in `state`; the dynamics are taken as settled.
+
+        ModelError for the state of a model of other effects.
+        """
+        self.chain.require_own(state)
         started = tuple(
             stage.start(state.inputs[-1] if k is None else state.inputs[k], None if k is None else state.blocks[k])
             for k, stage in self._stages

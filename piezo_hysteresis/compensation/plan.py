@@ -61,8 +61,8 @@ class Plan:
         Effects that have no inverse, and effects that the drive voltage does not influence.
     preview : int
         Number of samples by which the drive is ahead of the path.
-    end : ChainState
-        State of the model after the drive.
+    start, end : ChainState
+        State of the model before and after the drive.
     band : Band
         Low-pass filter of the path.
     """
@@ -77,6 +77,7 @@ class Plan:
     left_out: tuple[str, ...]
     not_on_path: tuple[str, ...]
     preview: int
+    start: ChainState
     end: ChainState
     band: Band
 
@@ -182,6 +183,7 @@ def plan(
         inverse.left_out,
         inverse.not_on_path,
         inverse.preview,
+        state,
         end,
         band,
     )

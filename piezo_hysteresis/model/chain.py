@@ -30,7 +30,7 @@ from ..blocks.block import Block, State, SumBlock
 from ..blocks.channel_addition import ChannelBlock
 from ..blocks.scaling import ChangeOfUnit, hand_out, take_in
 from ..effects import ChainPosition, Discretisation, Effect
-from ..errors import DivergenceError
+from ..errors import DivergenceError, ModelError
 from .samples import not_finite
 
 Array = NDArray[np.float64]
@@ -54,6 +54,8 @@ class ChainState:
     """Time of the next sample [s]."""
     sample_period: float
     """Sample period of the chain [s]."""
+    effects: tuple[str, ...]
+    """Names of the effects of the chain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +78,7 @@ class Chain:
     """
 
     def __init__(self, effects: tuple[Effect, ...], setting: Discretisation) -> None:
-        self.setting = setting
+        self.setting, self.effects = setting, tuple(e.name for e in effects)
         hosted: dict[str, tuple[Effect, ...]] = {
             e.name: tuple(t for t in effects if t.host == e.name) for e in effects if e.host is None
         }
@@ -126,7 +128,13 @@ class Chain:
             states.append(state if since is None else block.resume(x, state, time))
             inputs.append(x)
             x = block.static_at(x, time)
-        return ChainState(tuple(states), tuple(inputs), time, self.setting.sample_period)
+        return ChainState(tuple(states), tuple(inputs), time, self.setting.sample_period, self.effects)
+
+    def require_own(self, state: ChainState) -> None:
+        """Raise ModelError for the state of a chain of other effects."""
+        if state.effects != self.effects:
+            got, expected = (" → ".join(effects) or "no effects" for effects in (state.effects, self.effects))
+            raise ModelError(f"state: got one of another model ({got}), expected one of {expected}")
 
     def rest_tangent(self, voltage: float, wanted: Collection[str], time: float = 0.0) -> ChainTangent:
         """Tangent state of `rest` for the parameters `wanted`."""
@@ -144,7 +152,7 @@ class Chain:
         states = tuple(
             block.resume(x, s, state.time) for block, s, x in zip(self.blocks, state.blocks, state.inputs, strict=True)
         )
-        return ChainState(states, state.inputs, state.time, self.setting.sample_period)
+        return ChainState(states, state.inputs, state.time, self.setting.sample_period, self.effects)
 
     def resume_tangent(self, state: ChainState, tangent: ChainTangent) -> ChainTangent:
         """`resume` for the tangent state."""
@@ -202,7 +210,7 @@ class Chain:
         if not hand_out(y, self._factor_out, RUNAWAY * self.setting.displacement_scale):
             self._report_divergence(u, state, channels, first)
         time = state.time + u.size * self.setting.sample_period
-        return ChainState(tuple(states), tuple(inputs), time, self.setting.sample_period)
+        return ChainState(tuple(states), tuple(inputs), time, self.setting.sample_period, self.effects)
 
     def _report_divergence(self, u: Array, state: ChainState, channels: Channels, first: int) -> None:
         x = u
@@ -245,5 +253,5 @@ class Chain:
             states.append(s)
             tangents.append(t)
         time = state.time + u.size * self.setting.sample_period
-        state = ChainState(tuple(states), tuple(inputs), time, self.setting.sample_period)
+        state = ChainState(tuple(states), tuple(inputs), time, self.setting.sample_period, self.effects)
         return x, tuple(rows), dx, state, ChainTangent(tuple(tangents), tuple(dinputs))

@@ -18,12 +18,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Self, TypeVar
 
 from ..effects import Effect, HysteresisOperator
 from ..errors import ModelError
 from ..parameter import Parameter, Value
 from .chain_order import in_chain_order
+
+Kind = TypeVar("Kind", bound=Effect)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +66,19 @@ class Composition:
 
     def __contains__(self, name: object) -> bool:
         return any(e.name == name for e in self.effects)
+
+    def effect(self, kind: type[Kind]) -> Kind:
+        """The effect of a class, e.g. ``model.effect(Arx)``.
+
+        Raises
+        ------
+        ModelError
+            If the chain has none.
+        """
+        for effect in self.effects:
+            if isinstance(effect, kind):
+                return effect
+        raise ModelError(f"got no effect '{kind.name}' in {self!r}, expected one")
 
     @property
     def has_hysteresis(self) -> bool:

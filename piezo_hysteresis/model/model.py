@@ -162,7 +162,7 @@ class Model(Composition):
         Raises
         ------
         ModelError
-            On empty or non-finite samples, a period shorter than the model's, and a state of a model of other length.
+            On empty or non-finite samples, a period shorter than the model's, and a state of a model of other effects.
         RecordError
             On channels that a record would not have.
         DivergenceError
@@ -170,8 +170,7 @@ class Model(Composition):
         """
         before = state.sample_period
         chain = self.at(before if sample_period is None else sample_period, before)
-        if len(state.blocks) != len(chain.blocks):
-            raise ModelError(f"state: got one of another model, expected one of {self!r}")
+        chain.require_own(state)
         if chain.setting.sample_period != before:
             state = chain.resume(state)
         u = row(voltage, "voltage")

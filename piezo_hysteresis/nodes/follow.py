@@ -53,7 +53,8 @@ class Follower(GuardedNode):
         self.exit_status: int | None = None
         self._under_way = False
         self._line = ""
-        self.create_subscription(DiagnosticStatus, "status", self._on_status, LATCHED)  # the newest is enough
+        status = self.create_subscription(DiagnosticStatus, "status", self._on_status, LATCHED)  # the newest is enough
+        self._show(f"no message on {status.topic_name} yet; the identification node of this namespace has to run")
 
     def _on_status(self, status: DiagnosticStatus) -> None:
         values = values_of(status)

@@ -24,9 +24,10 @@ import pytest
 
 from piezo_hysteresis.blocks.block import Block, MemorylessBlock
 from piezo_hysteresis.blocks.inverses.inverted_block import InvertedBlock
-from piezo_hysteresis.compensation import Inverse
+from piezo_hysteresis.compensation import Inverse, Limits, plan
 from piezo_hysteresis.effects import (
     CHAIN,
+    UNNAMED,
     AmplifierBandwidth,
     AmplifierBandwidthHeld,
     Arx,
@@ -197,6 +198,15 @@ def test_the_effects_after_one_that_is_left_out_start_from_their_own_states(kind
         drives.append(inverse.run(reading, inverse.resume(start))[0])
         np.testing.assert_array_equal(inverse.run(reading, inverse.rest(3.0))[0], drives[-1])
     np.testing.assert_allclose(drives[1], drives[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", UNNAMED, ids=lambda kind: kind.name)
+def test_a_drive_without_a_correction_continues_from_the_present_voltage(kind: type[Effect]) -> None:
+    model = model_with(typical(kind))
+    _, now = model.run(np.append(np.linspace(0.0, 5.0, 500), np.full(5000, 3.0)), model.rest(0.0))
+    reading = np.full(100, model.run([3.0], now)[0][0])
+    drive = plan(model, reading, Limits(0.0, 10.0), start=now, approximate=True).voltage
+    np.testing.assert_allclose(drive, 3.0, rtol=0.0, atol=0.01)
 
 
 @every_effect

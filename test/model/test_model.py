@@ -73,6 +73,7 @@ def test_numbers_are_named_and_changed_by_name() -> None:
     assert changed["bouc_wen"]["A"] == -0.5
     assert MODEL.values()["arx.b[0]"] == 0.5
     assert MODEL.row("arx.b[0]").unit == "1"
+    assert MODEL.effect(Arx)["delay"] == MODEL["arx"]["delay"]
 
 
 def test_the_scales_are_part_of_the_model() -> None:
@@ -116,6 +117,7 @@ def test_a_run_continues_at_another_sample_period_with_its_state() -> None:
         (lambda: Model((Arx(),), PERIOD, voltage_scale=-1.0), "voltage_scale: got -1.0"),
         (lambda: Model((Arx(),), PERIOD, displacement_scale=float("nan")), "displacement_scale: got nan"),
         (lambda: MODEL["creep"], "no effect 'creep' in the chain bouc_wen, arx"),
+        (lambda: MODEL.effect(Creep), "no effect 'creep'"),
         (lambda: MODEL.at(PERIOD / 2), "expected 0.001 s .* or more; decimate"),
         (lambda: MODEL.run([], MODEL.rest(0.0)), "voltage: got shape"),
         (lambda: MODEL.run([[1.0]], MODEL.rest(0.0)), "voltage: got shape"),
@@ -124,6 +126,10 @@ def test_a_run_continues_at_another_sample_period_with_its_state() -> None:
         *((lambda p=p: MODEL.rest(0.0, sample_period=p), "sample period: got") for p in (0.0, np.nan, np.inf, -1.0)),
         (lambda: MODEL.run([1.0], MODEL.rest(0.0), sample_period=0.0), "sample period: got 0 s"),
         (lambda: MODEL.run([1.0], MODEL.without("arx").rest(0.0)), "state: got one of another model"),
+        (
+            lambda: MODEL.run([1.0], MODEL.without("arx").with_effect(Creep()).rest(0.0)),
+            "state: got one of another model",
+        ),
         (lambda: MODEL.run(["a"], MODEL.rest(0.0)), "voltage: got list, expected one dimension of real numbers"),
         (lambda: MODEL.run([[1.0], [1.0, 2.0]], MODEL.rest(0.0)), "voltage: got list, expected one dimension"),
         (lambda: MODEL.run(np.array([1j]), MODEL.rest(0.0)), "voltage: got ndarray, expected one dimension of real"),
@@ -145,6 +151,8 @@ def test_invalid_values_are_refused_in_one_line(build, message: str) -> None:
 def test_unknown_and_impossible_numbers_are_refused() -> None:
     with pytest.raises(ParameterError, match="unknown parameter 'gama'"):
         Creep(gama=0.1)
+    with pytest.raises(ParameterError, match=r"arx\.b: got an array parameter"):
+        MODEL["arx"]["b"]
     with pytest.raises(ParameterError, match=r"creep\.gamma: got 3 1/decade, expected -0\.2 to 0\.2"):
         Creep(gamma=3.0)
 

@@ -188,10 +188,14 @@ def test_stop_takes_the_stage_to_its_safe_voltage(lab):
     node.until("scan", "stopped")
 
 
-def test_its_end_leaves_the_stage_safe(lab):
+@pytest.mark.parametrize("drives", ["a path", "a displacement that is held"])
+def test_its_end_leaves_the_stage_safe(lab, drives):
     node = Compensation(lab)
-    node.send(scan(duration=5.0))
-    lab.wait(lambda: node.samples.newest.voltage[-1] > 1.0, "the scan to begin")
+    if drives == "a path":
+        node.send(scan(duration=5.0))
+    else:
+        lab.publisher(Float64, "set_displacement").publish(Float64(data=0.5 * STROKE))
+    lab.wait(lambda: node.samples.newest.voltage[-1] > 1.0, "motion")
     node.process.signal(signal.SIGTERM)
     assert node.process.wait() == 0
     lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")
@@ -253,6 +257,18 @@ def test_learning_claims_the_stage_and_leaves_it_safe(lab):
     lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")
 
 
+def test_its_end_leaves_alone_what_another_program_plays(lab):
+    node = Compensation(lab)
+    lab.send(np.concatenate((np.linspace(0.0, 2.0, 1000), np.full(60_000, 2.0))), "foreign", PERIOD)
+    lab.wait(lambda: node.samples.newest.voltage[-1] == pytest.approx(2.0, abs=1e-3), "the foreign waveform")
+    node.send(scan(duration=100.0), "planned_for_seconds")
+    node.until("planned_for_seconds", "planning")
+    node.process.signal(signal.SIGTERM)
+    assert node.process.wait() == 0
+    lab.pause(0.3)
+    assert node.samples.newest.voltage[-1] == pytest.approx(2.0, abs=1e-3)
+
+
 def test_a_stage_claimed_by_another_program_is_refused_with_the_reason(lab):
     node = Compensation(lab)
     holders = lab.listen(String, "claimed_by", LATCHED)
@@ -262,3 +278,12 @@ def test_a_stage_claimed_by_another_program_is_refused_with_the_reason(lab):
     node.send(scan())
     assert "claimed by another_lab" in node.until("scan", "refused").message
     assert not node.ask("learn").success
+
+
+def test_a_path_begins_where_a_moving_stage_has_come_to_rest(lab):
+    node = Compensation(lab, driver={**DRIVER, "real_time_factor": 1.0, "ramp_rate": 4.0})
+    lab.publisher(Float64, "set_voltage").publish(Float64(data=6.0))
+    lab.wait(lambda: node.samples.newest.voltage[-1] > 1.0, "motion")
+    node.send(scan(), "later")
+    node.until("later", "done")
+    assert node.samples.steepest(PERIOD) * PERIOD <= 0.01 * 10.0 + 0.01, "no jump to where the stage had been"

@@ -40,3 +40,8 @@ def test_without_a_job_it_follows_until_it_is_interrupted(lab):
     follow = lab.start("piezo", program=[sys.executable, "-m", "piezo_hysteresis.nodes.follow", "/"])
     lab.wait(lambda: "idle" in follow.output, "the state")
     assert follow.is_running
+
+
+def test_a_namespace_without_a_node_is_reported(lab):
+    follow = lab.start("piezo", program=[sys.executable, "-m", "piezo_hysteresis.nodes.follow", "/absent"])
+    lab.wait(lambda: "no message on /absent/status yet" in follow.output, "the message")

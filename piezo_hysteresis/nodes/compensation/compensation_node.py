@@ -81,13 +81,14 @@ class CompensationNode(GuardedNode):
         self.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def end(self) -> None:
-        """Stop the running job while services still work."""
+        """End the running job while services still work, and let the driver end what this node plays or holds."""
         self._actions.end()
-        if self._job is not None:
-            self._give_up()
-            asked = self._driver.stop()
-            if asked is not None:
-                self.executor.spin_until_future_complete(asked, timeout_sec=2.0)
+        drives = self._runs.tracking is not None or self._set_point.is_holding
+        self._set_point.leave()
+        self._give_up()
+        asked = self._driver.stop() if drives else None
+        if asked is not None:
+            self.executor.spin_until_future_complete(asked, timeout_sec=2.0)
         self._runs.close()
 
     def _on_model(self, message: String) -> None:

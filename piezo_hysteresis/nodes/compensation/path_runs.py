@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
@@ -35,6 +36,10 @@ TICK = 0.02
 """Period at which a job goes on [s]."""
 _STARTED_WITHIN = 20.0
 """Longest wait for the driver to begin with a waveform, or for its last samples [s]."""
+
+_REST, _REST_TIME = 0.01, 0.2
+"""Largest change of the drive of a stage at rest, as a share of its range, and shortest time for which it is watched
+[s]."""
 
 Job = Generator[None]
 
@@ -103,6 +108,31 @@ class PathRuns:
             yield
         return future.result()
 
+    def _planned_at_rest(
+        self, applied: AppliedState, wanted: np.ndarray, limits: Limits
+    ) -> Generator[None, None, Plan]:
+        """Plan a path; again while the stage has moved meanwhile, for example on its way to a set-point.
+
+        Raises
+        ------
+        StageError
+            If the stage moves for too long.
+        """
+        near, deadline = _REST * (limits.voltage_max - limits.voltage_min), time.monotonic() + _STARTED_WITHIN
+        while True:
+            watched = time.monotonic() + _REST_TIME
+            found: Plan = yield from self._in_thread(self._pool.submit(self.planned, applied, wanted, limits))
+            while time.monotonic() < watched:
+                yield
+            begin = found.start.inputs[0]
+            if abs(applied.voltage - begin) <= near:
+                return found
+            if time.monotonic() > deadline:
+                raise StageError(
+                    f"the stage moves: it is at {applied.voltage:.4g} V, and was at {begin:.4g} V when the path was "
+                    "planned; let it come to rest"
+                )
+
     def follow(self, name: str, applied: AppliedState, wanted: np.ndarray, limits: Limits) -> Job:
         """Plan a path and play it.
 
@@ -115,7 +145,7 @@ class PathRuns:
         """
         self._status.show("planning", f"{wanted.size} samples", name)
         yield from self._until(lambda: applied.is_ready, "the model to be run over the applied voltages")
-        found: Plan = yield from self._in_thread(self._pool.submit(self.planned, applied, wanted, limits))
+        found = yield from self._planned_at_rest(applied, wanted, limits)
         self.last = (name, found)
         if not found.reachability.is_whole:
             raise PathError(why_not(found))
@@ -179,7 +209,7 @@ class PathRuns:
             approximate=self._values["approximate"],
         )
         # the stage is no longer where the first plan began
-        again: Plan = yield from self._in_thread(self._pool.submit(self.planned, applied, first.wanted, limits))
+        again = yield from self._planned_at_rest(applied, first.wanted, limits)
         learning.next = again if again.reachability.is_whole else None
         for number in range(1 + self._values["learning_rounds"]):
             if learning.next is None:

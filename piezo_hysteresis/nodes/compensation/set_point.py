@@ -58,11 +58,19 @@ class SetPoint:
     def __init__(self, publisher: Any, integral_time: float) -> None:
         self._publisher, self._integral_time = publisher, integral_time
         self._target: float | None = None
-        self._voltage = self._slope = self._waited = 0.0
+        self._voltage = self._slope = 0.0
         self._limits = Limits()
-        self._sum, self._count = 0.0, 0
-        self._has_arrived = False
-        self._nearest, self._away = np.inf, 0.0
+        self._await_arrival()
+
+    def _await_arrival(self) -> None:
+        """The stage is on the way to a new voltage: the error is counted from its arrival on."""
+        self._waited, self._sum, self._count = 0.0, 0.0, 0
+        self._has_arrived, self._nearest, self._away = False, np.inf, 0.0
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether a displacement is held."""
+        return self._target is not None
 
     def go(self, target: float, voltage: float, slope: float, limits: Limits) -> None:
         """Hold a displacement [m] by a voltage [V]; `slope` is that of voltage against displacement [V/m]."""
@@ -115,7 +123,5 @@ class SetPoint:
         self._send()
 
     def _send(self) -> None:
-        self._waited, self._sum, self._count = 0.0, 0.0, 0
-        self._has_arrived = False
-        self._nearest, self._away = np.inf, 0.0
+        self._await_arrival()
         send(self._publisher, Float64(data=self._voltage))

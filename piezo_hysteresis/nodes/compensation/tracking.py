@@ -38,6 +38,9 @@ class Tracking:
         self.plan = plan
         self.first: int | None = None
         """Index of the first sample of the drive, once the driver has reported it."""
+        self.newest_error: float | None = None
+        """Wanted − measured displacement of the newest received sample of the path [m]; None before the first."""
+        self._squares, self._count = 0.0, 0
         self._measured = np.full(plan.voltage.size, np.nan)
         self._early: list[SampleBlock] = []
 
@@ -61,7 +64,19 @@ class Tracking:
         begin = (int(block.index[0]) - self.first + 2**31) % 2**32 - 2**31
         a, b = max(begin, 0), min(begin + block.size, self._measured.size)
         if b > a:
-            self._measured[a:b] = block.displacement[a - begin : b - begin]
+            measured, known = block.displacement[a - begin : b - begin], self._measured[a:b]
+            self._count_errors(a, np.where(np.isnan(known), measured, np.nan))
+            known[:] = measured
+
+    def _count_errors(self, begin: int, new: Array) -> None:
+        """Add the errors of new samples from drive sample `begin` on; those that are known already are NaN."""
+        first = max(self.plan.begin - begin, 0)
+        wanted = self.plan.wanted[begin + first - self.plan.begin :][: max(new.size - first, 0)]
+        errors = wanted - new[first : first + wanted.size]
+        errors = errors[np.isfinite(errors)]
+        if errors.size:
+            self.newest_error = float(errors[-1])
+            self._squares, self._count = self._squares + float(errors @ errors), self._count + errors.size
 
     @property
     def is_whole(self) -> bool:
@@ -69,30 +84,11 @@ class Tracking:
         return bool(np.isfinite(self._measured[-1]))
 
     @property
-    def lost(self) -> int:
-        """Number of samples of the drive that did not arrive."""
-        return int(np.isnan(self._measured).sum())
-
-    @property
     def measured(self) -> Array:
         """Displacement for every sample of the drive [m], shape (m,); predicted where samples were lost."""
         return np.where(np.isnan(self._measured), self.plan.predicted, self._measured)
 
     @property
-    def errors(self) -> Array:
-        """Wanted − measured displacement of the received samples of the path [m]."""
-        begin = self.plan.begin
-        off = self.plan.wanted - self._measured[begin : begin + self.plan.wanted.size]
-        return np.asarray(off[np.isfinite(off)])
-
-    @property
-    def newest_error(self) -> float | None:
-        """Error of the newest received sample of the path [m]; None before the first."""
-        errors = self.errors
-        return float(errors[-1]) if errors.size else None
-
-    @property
     def rms(self) -> float | None:
-        """Rms of the errors so far [m]; None before the first."""
-        errors = self.errors
-        return float(np.sqrt(np.mean(errors**2))) if errors.size else None
+        """Rms of wanted − measured displacement of the received samples of the path [m]; None before the first."""
+        return float(np.sqrt(self._squares / self._count)) if self._count else None

@@ -109,7 +109,7 @@ class BagRecorder:
         try:
             self._bag.write(topic, now(self._node), message)
         except RecordingError as error:
-            self.failure = error
+            self.failure = RecordingError(f"{error}; its part before that is readable")
         except Exception as error:
             self.failure = RecordingError(f"the recording ended: {reason_of(error)}")
         self.counts[name] += 1

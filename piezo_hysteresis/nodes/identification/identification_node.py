@@ -208,7 +208,7 @@ class IdentificationNode(GuardedNode):
         self._folder.last = path
         yield from self._fit(identification, path)
 
-    def _fit(self, job: Job, path: Path) -> Generator[Progress]:
+    def _fit(self, job: Job[Outcome], path: Path) -> Generator[Progress]:
         self._moves = False
         self._status.experiment, self._status.owner = str(path), ""
         model = self._served.model
