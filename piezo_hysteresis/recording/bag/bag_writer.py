@@ -214,9 +214,7 @@ class BagWriter:
             self._open = False
             with suppress(OSError):  # closing flushes once more what the disk has just refused
                 self._stream.close()
-            raise RecordingError(
-                f"{self.path}: {error.strerror or error}; the recording ended; its part before that is readable"
-            ) from error
+            raise RecordingError(f"{self.path}: {error.strerror or error}; the recording ended") from error
 
     def _write_metadata(self) -> None:
         draft = self.path / "metadata.yaml.tmp"

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -72,6 +73,8 @@ class Rosbag2:
     def write(self, experiment: Experiment, path: Path) -> None:
         """Write the records as the driver would send them, in blocks of 10 ms, to the folder `path` without its ending.
 
+        A folder that could not be written to its end is deleted.
+
         A record that does not continue the one before it is preceded by one idle sample at its settled voltage, as from
         a driver that was started again; a truncated one is not. Time between records in which the drive was held is
         written as a pause, without samples. Before a truncated record that continues, samples are missing. Other
@@ -82,29 +85,13 @@ class Rosbag2:
         RecordingError
             If the folder exists or cannot be written, or a pause is longer than the running index can express.
         """
-        with BagWriter(path.with_suffix("") if path.suffix == ".mcap" else path) as bag:
-            bag.add_topic("/samples", TYPE)
-            bag.add_topic("/phase", STRING, depth=1, transient_local=True)
-            clock_ns, index, end = 1_000_000_000, 0, experiment[0].start_time
-            for number, record in enumerate(experiment, 1):
-                silent = max(0, round((record.start_time - end) / record.sample_period))
-                if record.continues:
-                    silent = max(silent, int(record.truncated))  # the missing samples show that its state is unknown
-                    if silent > _LONGEST_SILENCE:
-                        reason = f"begins {silent} samples after the end of the one before it, expected fewer than 2³¹"
-                        raise RecordingError(f"record {number}: {reason}; write csv or npz")
-                    index += silent
-                else:
-                    silent, index = max(0, silent - (not record.truncated)), 0  # the idle sample takes one
-                clock_ns += round(silent * record.sample_period * 1e9)
-                if not record.continues and not record.truncated:
-                    bag.write("/phase", clock_ns, PhaseNames.to_cdr(0, IDLE))
-                    settled = replace(record[:1], voltage=np.array([record.settled_voltage]))
-                    clock_ns, index = _write_blocks(bag, settled, 0, clock_ns, index)
-                bag.write("/phase", clock_ns, PhaseNames.to_cdr(number, record.phase))
-                is_held = record.continues and not record.truncated and silent > 0
-                clock_ns, index = _write_blocks(bag, record, number, clock_ns, index, follows_pause=is_held)
-                end = record.start_time + record.duration
+        bag = BagWriter(path.with_suffix("") if path.suffix == ".mcap" else path)
+        try:
+            with bag:
+                _write_records(bag, experiment)
+        except BaseException:
+            shutil.rmtree(bag.path, ignore_errors=True)
+            raise
 
 
 def recorded_model(path: str | Path, *, axis: str | None = None) -> str | None:
@@ -177,6 +164,32 @@ def _read_samples(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[No
     averages = shared_averages([s.size for s in segments], options.average)
     records, more = records_of(segments, averages, names.get(space, PhaseNames()), options)
     return records, [*notices, *more_notices, *more]
+
+
+def _write_records(bag: BagWriter, experiment: Experiment) -> None:
+    """The messages of all records; see `Rosbag2.write`."""
+    bag.add_topic("/samples", TYPE)
+    bag.add_topic("/phase", STRING, depth=1, transient_local=True)
+    clock_ns, index, end = 1_000_000_000, 0, experiment[0].start_time
+    for number, record in enumerate(experiment, 1):
+        silent = max(0, round((record.start_time - end) / record.sample_period))
+        if record.continues:
+            silent = max(silent, int(record.truncated))  # the missing samples show that its state is unknown
+            if silent > _LONGEST_SILENCE:
+                reason = f"begins {silent} samples after the end of the one before it, expected fewer than 2³¹"
+                raise RecordingError(f"record {number}: {reason}; write csv or npz")
+            index += silent
+        else:
+            silent, index = max(0, silent - (not record.truncated)), 0  # the idle sample takes one
+        clock_ns += round(silent * record.sample_period * 1e9)
+        if not record.continues and not record.truncated:
+            bag.write("/phase", clock_ns, PhaseNames.to_cdr(0, IDLE))
+            settled = replace(record[:1], voltage=np.array([record.settled_voltage]))
+            clock_ns, index = _write_blocks(bag, settled, 0, clock_ns, index)
+        bag.write("/phase", clock_ns, PhaseNames.to_cdr(number, record.phase))
+        is_held = record.continues and not record.truncated and silent > 0
+        clock_ns, index = _write_blocks(bag, record, number, clock_ns, index, follows_pause=is_held)
+        end = record.start_time + record.duration
 
 
 def _write_blocks(
