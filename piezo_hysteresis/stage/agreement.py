@@ -12,10 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Agreement`: checks that the measurement follows the requested drive.
-
-A lag is allowed, a lasting difference is not.
-"""
+"""`Agreement`: checks that the measured voltage follows the requested drive, and that the displacement changes."""
 
 from __future__ import annotations
 
@@ -30,18 +27,18 @@ from .description import Samples
 class Agreement:
     """Compares the requested drive with the measurement, block by block.
 
-    A difference of one sign that lasts longer than the settling time cannot be a lag of the amplifier. It shows
-    saturation, exchanged channels, another sample period, a repeated block, or a servo that is switched on. A
-    displacement that stays exactly the same while the drive moves is not a measurement.
+    The voltages may differ by more than the tolerance while the amplifier settles. A difference of one sign that lasts
+    longer shows saturation, exchanged channels, another sample period, a repeated block, or a servo that is switched
+    on. A displacement that stays exactly the same while the drive moves is not a measurement.
 
     Parameters
     ----------
     tolerance : float
         Largest steady difference of the voltages [V].
     settling_samples : int
-        Number of samples that the voltage needs to follow a step.
+        Number of consecutive samples for which the difference may be larger, e.g. after a step.
     displacement_min, displacement_max : float
-        Range of the sensor [m]. At its ends the signal may be constant; readers of a recording report it as clipped.
+        Range of the sensor [m]. At its ends the signal may be constant, because the sensor is clipped there.
     """
 
     def __init__(
@@ -70,7 +67,7 @@ class Agreement:
         Raises
         ------
         DeviceError
-            If they disagree; the message names the first sample of the difference.
+            If they disagree.
         """
         self._follows(asked, voltage)
         self._moves(voltage, displacement)
@@ -87,7 +84,8 @@ class Agreement:
                 raise DeviceError(
                     f"measured a drive of {voltage[worst]:g} V at sample {self._seen + worst}, expected "
                     f"{asked[worst]:g} V within {self._tolerance:g} V (since sample {self._seen + first - before}): "
-                    "saturated, channels exchanged, or not the record of this waveform"
+                    "the amplifier is saturated or slower than settling_time, the channels are exchanged, or the "
+                    "samples belong to another waveform"
                 )
             self._side, self._apart = float(side[first]), before + int(end - first)
 
@@ -100,5 +98,5 @@ class Agreement:
         if self._range[0] < self._value < self._range[1] and self._high - self._low > self._tolerance:
             raise DeviceError(
                 f"the displacement stayed at exactly {self._value:g} m while the drive moved by "
-                f"{self._high - self._low:g} V, expected a sensor that moves; stale readings, or no sensor connected"
+                f"{self._high - self._low:g} V, expected new readings; check that the sensor is connected"
             )

@@ -70,7 +70,7 @@ class Description:
     Raises
     ------
     StageError
-        If a minimum lies above its maximum, or the safe voltage lies outside the limits.
+        If a minimum lies above its maximum, the safe voltage lies outside the limits, or another value is impossible.
     """
 
     name: str
@@ -106,7 +106,10 @@ class Description:
         if not 0 <= self.latency < math.inf:
             raise StageError(f"{self.name}: got latency {self.latency:g} s, expected 0 or more")
         if not (self.sample_period_min > 0 and self.max_slew_rate > 0 and self.amplifier_gain != 0):
-            raise StageError(f"{self.name}: expected a positive sample period and slew rate and a gain other than zero")
+            raise StageError(
+                f"{self.name}: got sample period {self.sample_period_min:g} s, slew rate {self.max_slew_rate:g} V/s "
+                f"and gain {self.amplifier_gain:g}, expected a positive period and rate and a gain other than zero"
+            )
 
     def check_sample_period(self, sample_period: float) -> float:
         """Return `sample_period` [s] if the stage can run at it.

@@ -36,7 +36,7 @@ class HiddenEffect:
     Parameters
     ----------
     name : str
-        Identifier of the catalogue.
+        Identifier of the effect in the catalogue.
     changes : dict
         Quantities of the plant that were changed, by dotted name.
     parameters : PlantParameters
@@ -51,14 +51,14 @@ class HiddenEffect:
 def hidden_effect(
     seed: int, base: PlantParameters | None = None, *, name: str | None = None, highest_voltage: float = 6.0
 ) -> HiddenEffect:
-    """Draw one effect of the catalogue and its size. The size is large enough to be found and realistic.
+    """Draw one effect of the catalogue and its size. The size is realistic, and large enough to be found.
 
     Parameters
     ----------
     seed : int
         Seed of the random choice; the same seed hides the same effect.
     base : PlantParameters, optional
-        Stage to hide it in. The stage of another hidden effect then has two. Default: a stage without hidden effects.
+        Stage that gets the effect, in addition to hidden effects that it already has. Default: a stage without any.
     name : str, optional
         Draw only the size of this effect.
     highest_voltage : float
@@ -141,7 +141,7 @@ def _saturation(rng: np.random.Generator, base: PlantParameters, highest: float)
 
 
 def _slew(rng: np.random.Generator, base: PlantParameters, highest: float) -> Changes:
-    # the slope of a sine between 150 and 350 Hz over 5/6 of the range
+    # the steepest slope of a sine of 150 to 350 Hz, whose peak-to-peak value is 5/6 of the range at the piezo
     slope = np.pi * base.electronics.amplifier_gain * highest * 5 / 6
     return {"electronics.amplifier_slew": float(slope * rng.uniform(150.0, 350.0))}
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Limiter`: range, slew and ramp rate of the drive. Every voltage passes it last, before the device."""
+"""`Limiter`: the last check of every voltage before the device: range, slew and ramp rate."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ LONGEST_PART = 65536
 
 
 class Limiter:
-    """Limits the output of a stage, sample by sample.
+    """Refuses waveforms outside the limits of a stage, and computes the ramps of the stage itself.
 
-    A stage passes every waveform to its limiter before the device gets it. The limiter also computes every ramp of the
-    stage itself: to a set-point, to the safe voltage, after a fault, and on closing. A stage starts with the limits of
-    its own description; a driver narrows them with `Stage.restrict`.
+    A stage passes every waveform to its limiter before the device gets it. The ramps lead to a set-point, and to the
+    safe voltage after a fault and on closing. A stage starts with the limits of its own description; a driver narrows
+    them with `Stage.restrict`.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class Limiter:
         """Return the voltage `goal` [V]; StageError if it is not finite or outside the range."""
         return float(self.limits.check_voltage(np.array([voltage], dtype=np.float64), float(voltage), 1.0)[0])
 
-    def way(
+    def ramp(
         self, present_voltage: float, goal: float, sample_period: float, longest: int = LONGEST_PART
     ) -> Iterator[Samples]:
         """Samples of the straight ramp to a voltage, without the present voltage. The last one is exactly the goal.

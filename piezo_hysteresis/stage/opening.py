@@ -27,7 +27,7 @@ from .stage import Stage
 
 
 def _no_reader(path: str) -> Iterable[Record]:
-    raise StageError(f"{path}: this program reads no recordings, expected another stage than 'replay'")
+    raise StageError(f"{path}: this program reads no recordings, expected a stage other than 'replay'")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,11 +56,11 @@ class BackEnd:
     Parameters
     ----------
     word : str
-        Value of the driver's parameter `stage` that chooses it.
+        Value of the driver's parameter `stage` that selects it.
     rows : tuple of Parameter or Setting
         ROS parameters of the stage, declared under the prefix ``"<word>."``.
     open : callable
-        Makes the stage from the values of the rows and an `Opening`.
+        Function that opens the stage from the values of the rows and an `Opening`.
     is_device : bool
         True for hardware. It is locked by the name of the device and runs in real time.
     has_keeper : bool

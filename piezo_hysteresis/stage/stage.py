@@ -93,11 +93,11 @@ class Stage(Protocol):
         ...
 
     def safe(self) -> None:
-        """Stop a waveform that is playing, and ramp to the safe voltage. A repeated call does no harm."""
+        """Stop a waveform that is playing, and ramp to the safe voltage. It may be repeated."""
         ...
 
     def close(self) -> None:
-        """Go to the safe voltage and release the device. A repeated call does no harm; any other raises StageError."""
+        """Go to the safe voltage and release the device. It may be repeated; every other call raises StageError."""
         ...
 
     def leave(self) -> None:

@@ -36,7 +36,14 @@ PARAMETERS: tuple[Row, ...] = (
     Setting("server", _DAQMX.server, "host:port of an NI gRPC device server; empty: the driver on this machine"),
     Parameter("sample_period_min", "", "s", _DAQMX.sample_period_min, 1e-9, 1.0, "shortest sample period", "the card"),
     Parameter(
-        "lead", "", "s", _DAQMX.lead, 1e-3, 10.0, "duration of output in the buffer; it is the latency", "the machine"
+        "lead",
+        "",
+        "s",
+        _DAQMX.lead,
+        1e-3,
+        10.0,
+        "duration of the output in the buffer, which is the latency",
+        "the machine",
     ),
     Parameter("voltage_min", "u_min", "V", _DAQMX.voltage_min, -10.0, 10.0, "lowest drive voltage", "rig"),
     Parameter("voltage_max", "u_max", "V", _DAQMX.voltage_max, -10.0, 10.0, "highest drive voltage", "rig"),
@@ -55,10 +62,12 @@ PARAMETERS: tuple[Row, ...] = (
     Parameter("voltage_tolerance", "", "V", 1.0, 1e-3, 1e3, "largest steady error of the piezo voltage", "rig"),
     Parameter("settling_time", "", "s", 0.01, 0.0, 10.0, "time the amplifier needs to follow a step", "rig"),
     Parameter("sensor_range", "", "V", _DAQMX.sensor_range, 1e-3, 10.0, "the inputs span ± this voltage", "the card"),
-    Parameter("io_delay", "", "s", 0.0, 0.0, 1.0, "delay of the card itself, from a loop-back", "loop_back_delay"),
+    Parameter(
+        "io_delay", "", "s", 0.0, 0.0, 1.0, "delay of the card itself, from a loop-back measurement", "loop_back_delay"
+    ),
     Parameter("timeout", "", "s", _DAQMX.timeout, 0.01, 600.0, "longest wait for samples or for a server", "network"),
 )
-"""Of the driver, under ``nidaqmx.``."""
+"""Parameters of the driver, declared under ``nidaqmx.``."""
 
 
 def open(values: Mapping[str, Any], opening: Opening) -> Stage:

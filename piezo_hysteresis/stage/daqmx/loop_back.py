@@ -39,7 +39,7 @@ def loop_back_delay(stage: StreamingStage, amplitude: float = 1.0) -> float:
     stage : StreamingStage
         On that card; noise is played around its present voltage, to which it returns.
     amplitude : float
-        Peak of the noise [V]; the noise lies on the inner side of the present voltage.
+        Peak of the noise [V]. The noise lies above the present voltage if the range allows it, otherwise below.
 
     Returns
     -------

@@ -50,7 +50,7 @@ class DaqmxSetup:
     voltage_min, voltage_max : float
         Limits of the drive before the amplifier [V].
     max_slew_rate : float
-        Steepest drive [V/s], and rate of the way to the safe voltage unless a driver has a lower one; has to be given.
+        Steepest drive [V/s], and rate of the ramp to the safe voltage unless a driver sets a lower one; required.
     safe_voltage : float
         Drive voltage of the stage at rest [V].
     assume_safe : bool
@@ -62,7 +62,7 @@ class DaqmxSetup:
     sensor_gain : float
         Displacement over sensor voltage [m/V].
     voltage_tolerance : float
-        Largest steady difference between piezo voltage given and measured [V].
+        Largest steady difference between requested and measured piezo voltage [V].
     settling_time : float
         Time that the amplifier needs to follow a step [s].
     sensor_range : float
@@ -71,7 +71,7 @@ class DaqmxSetup:
         Delay of the card from output to input, measured by `loop_back_delay` [s]. Its whole samples are subtracted, so
         that the remaining delay is that of the stage; irrelevant where the drive is measured.
     timeout : float
-        Longest wait for samples beyond their own time, and longest silence of a server [s].
+        Longest wait for samples beyond their own duration, and longest time without an answer of a server [s].
 
     Raises
     ------

@@ -39,8 +39,8 @@ _CLIPPED = 0.998
 class DaqmxStage:
     """A streaming stage: output and input on one hardware clock, without regeneration.
 
-    A given block waits in the output buffer for `Description.latency` samples. `exchange` returns the samples that were
-    applied and measured meanwhile. A block that comes too late ends the stream with an error.
+    A block waits in the output buffer for `Description.latency`. `exchange` returns the samples that were applied and
+    measured that long before. A block that comes too late ends the stream with an error.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class DaqmxStage:
     Raises
     ------
     StageError
-        If NI-DAQmx, the server or the card is not there.
+        If NI-DAQmx, the server or the card is missing, or the voltage at the output is unknown.
     """
 
     def __init__(self, setup: DaqmxSetup) -> None:
@@ -87,7 +87,7 @@ class DaqmxStage:
 
     @property
     def voltage(self) -> float:
-        """Last commanded drive voltage [V]; after opening the voltage that was found."""
+        """Last commanded drive voltage [V]; after opening, the measured or assumed one."""
         return self._voltage
 
     def configure(self, sample_period: float) -> None:
@@ -144,7 +144,7 @@ class DaqmxStage:
             raise StageError(f"{error}; {self._unknown()}") from None
 
     def close(self) -> None:
-        """Make safe and release the card; every later call but `close` and `safe` raises StageError."""
+        """Go to the safe voltage and release the card; every later call but `close` and `safe` raises StageError."""
         try:
             self.safe()
         finally:
@@ -219,7 +219,7 @@ class DaqmxStage:
         elif self._tasks.is_running:
             try:
                 goal = self._description.safe_voltage
-                for part in self._limiter.way(self._voltage, goal, self._sample_period, self._lead):
+                for part in self._limiter.ramp(self._voltage, goal, self._sample_period, self._lead):
                     self._stream(part)
                 self._drain()
             except DeviceError:
@@ -238,9 +238,9 @@ class DaqmxStage:
         self._go(self._description.safe_voltage)
 
     def _go(self, goal: float) -> None:
-        """Go to a voltage [V] along the limiter's way, sample by sample on the clock of the card; nothing streams."""
+        """Go to a voltage [V] by the ramp of the limiter, on the clock of the card; no stream is running."""
         period = max(min(self._sample_period, _RAMP_PERIOD), self._description.sample_period_min)
-        for part in self._limiter.way(self._voltage, goal, period):
+        for part in self._limiter.ramp(self._voltage, goal, period):
             if part.size > 1:
                 self._tasks.play(part, period)
             else:

@@ -65,7 +65,7 @@ class Tasks:
             import nidaqmx.stream_writers
         except ImportError:
             raise StageError(
-                "NI-DAQmx: the package nidaqmx is not installed, expected it; pip install 'nidaqmx[grpc]'"
+                "NI-DAQmx: the package nidaqmx is not installed; install it with pip install 'nidaqmx[grpc]'"
             ) from None
         self._setup, self._nidaqmx = setup, nidaqmx
         self._channel: Any = None
@@ -97,7 +97,9 @@ class Tasks:
                 )
                 self._writer = streams.stream_writers.AnalogSingleChannelWriter(self._output.out_stream, False)
                 self._reader = streams.stream_readers.AnalogMultiChannelReader(self._input.in_stream)
-                self._writer.verify_array_shape = self._reader.verify_array_shape = False  # asks the card every time
+                self._writer.verify_array_shape = self._reader.verify_array_shape = (
+                    False  # the check asks the card at every call
+                )
                 self._writer.write_many_sample(first, s.timeout)
                 self._input.start()  # waits for the clock of the output
                 self._output.start()
@@ -186,12 +188,12 @@ class Tasks:
             self._calls = grpc.intercept_channel(self._channel, Deadline(self._setup.timeout))
 
     def _require_rate(self, asked: float) -> None:
-        """A card divides its timebase by whole numbers, and takes the nearest rate without a message."""
+        """DaqmxError if the card samples at another rate; it takes the nearest one that it has, without a message."""
         rate = float(self._output.timing.samp_clk_rate)
         if not abs(rate / asked - 1) <= _RATE_TOLERANCE:
             raise DaqmxError(
                 f"NI-DAQmx, {self._setup.device}: samples every {1 / rate:.9g} s, expected {1 / asked:.9g} s; "
-                "ask for a sample period that the card has"
+                "choose a whole multiple of the period of the card's timebase"
             )
 
     def _finite(self, samples: Samples) -> Samples:

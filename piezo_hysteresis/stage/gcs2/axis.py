@@ -35,11 +35,11 @@ NEEDED = (
 _SAMPLE_TIME_TOLERANCE = 1e-3
 """Relative difference up to which two sample times count as equal."""
 _HIGHEST_VOLTAGE = 1e4
-"""Largest voltage of any piezo amplifier [V]."""
+"""Voltage above which an answer of the controller is impossible [V]."""
 _SERVO_TIMES = (1e-6, 0.1)
-"""Range of possible servo times [s]."""
+"""Range outside which a servo time is impossible [s]."""
 _LONGEST_TRAVEL = 0.1
-"""Largest travel of any piezo stage [m]."""
+"""Position beyond which an answer of the controller is impossible [m]."""
 _POLL = 5e-3
 """Time between two queries whether the generator is running [s]."""
 
@@ -163,7 +163,7 @@ class Axis:
         due = time.monotonic() + s.timeout
         while self.is_playing():
             if time.monotonic() > due:
-                raise Gcs2Error(f"{self.client.connection.place}: plays {s.timeout:g} s after the end of a ramp")
+                raise Gcs2Error(f"{self.client.connection.place}: still plays {s.timeout:g} s after the end of a ramp")
             time.sleep(_POLL)
         self.set_voltage(float(line[-1]))
 
@@ -176,7 +176,8 @@ class Axis:
             if left <= 0:
                 raise Gcs2Error(
                     f"{self.client.connection.place}: measured a drive of {measured:g} V, expected {drive:g} V within "
-                    f"{tolerance:g} V; saturated, or check amplifier_gain, command_per_volt and command_at_zero"
+                    f"{tolerance:g} V; the amplifier is saturated, or amplifier_gain, command_per_volt or "
+                    "command_at_zero is wrong"
                 )
             time.sleep(min(left, 2e-3))
 
@@ -235,9 +236,8 @@ class Axis:
         for array in self.waves.arrays("DRR?", count, tables):
             period = array.sample_time
             if period is None or abs(period / sample_period - 1) > _SAMPLE_TIME_TOLERANCE:
-                raise Gcs2Error(
-                    f"{place}: recorded every {period} s, expected {sample_period:g} s; check the servo time"
-                )
+                got = "without a sample time" if period is None else f"every {period:g} s"
+                raise Gcs2Error(f"{place}: recorded {got}, expected {sample_period:g} s; check the servo time")
             if parts and np.array_equal(array.values, parts[-1]) and np.ptp(array.values[:, 1]) > 0:
                 raise Gcs2Error(f"{place}: got the same {len(parts[-1])} recorded samples twice; read again")
             parts.append(array.values)
@@ -247,6 +247,6 @@ class Axis:
             at = int(outside.argmax())
             raise Gcs2Error(
                 f"{place}: recorded position {at} is {values[at, 1]:g}, expected {self._travel[0]:g} to "
-                f"{self._travel[1]:g}; wrong position_unit, or channels exchanged"
+                f"{self._travel[1]:g}; position_unit is wrong, or the channels are exchanged"
             )
         return values[:, 0] / s.amplifier_gain, values[:, 1] * s.position_unit

@@ -26,7 +26,7 @@ from .setup import Gcs2Setup
 from .stage import Gcs2Stage
 
 _UNVERIFIED = "not verified on a device: docs/hardware.md"
-"""Remark on parameters that no device has confirmed yet."""
+"""Remark on parameters that were not yet checked with a real controller."""
 _GCS2 = Gcs2Setup(host="-", max_slew_rate=1.0)
 """Set-up whose values are the defaults."""
 
@@ -50,21 +50,25 @@ PARAMETERS: tuple[Row, ...] = (
     Setting(
         "servo_time_parameter",
         _GCS2.servo_time_parameter,
-        f"number of the servo time; {_UNVERIFIED}",
+        f"number of the controller parameter that holds the servo time; {_UNVERIFIED}",
         lower=0,
         upper=2**32 - 1,
     ),
     Setting(
         "recorder_parameter",
         _GCS2.recorder_parameter,
-        f"number of the recorder's points; {_UNVERIFIED}",
+        f"number of the controller parameter that holds the recorder points; {_UNVERIFIED}",
         lower=0,
         upper=2**32 - 1,
     ),
     Setting(
-        "points_per_command", _GCS2.points_per_command, f"wave points in one line; {_UNVERIFIED}", lower=1, upper=10_000
+        "points_per_command",
+        _GCS2.points_per_command,
+        f"wave points in one command; {_UNVERIFIED}",
+        lower=1,
+        upper=10_000,
     ),
-    Setting("rows_per_answer", _GCS2.rows_per_answer, "recorded samples asked for at once", lower=1, upper=2**20),
+    Setting("rows_per_answer", _GCS2.rows_per_answer, "recorded samples in one answer", lower=1, upper=2**20),
     Setting("read_back", _GCS2.read_back, "compare the wave table with what was sent before anything moves"),
     Setting(
         "longest_wave",
@@ -76,12 +80,19 @@ PARAMETERS: tuple[Row, ...] = (
     Setting(
         "longest_multiple",
         _GCS2.longest_multiple,
-        f"largest sample period in servo times; {_UNVERIFIED}",
+        f"longest sample period, as a multiple of the servo time; {_UNVERIFIED}",
         lower=1,
         upper=2**31 - 1,
     ),
     Parameter(
-        "amplifier_gain", "G_a", "V/V", 1.0, -1e4, 1e4, "piezo voltage over drive voltage; 1: drive = piezo", "rig"
+        "amplifier_gain",
+        "G_a",
+        "V/V",
+        1.0,
+        -1e4,
+        1e4,
+        "piezo voltage over drive voltage; 1 if both are the same",
+        "rig",
     ),
     Parameter(
         "command_per_volt", "c", "1/V", 1.0, -1e3, 1e3, f"open-loop command over piezo voltage; {_UNVERIFIED}", "rig"
@@ -89,12 +100,12 @@ PARAMETERS: tuple[Row, ...] = (
     Parameter("command_at_zero", "c_0", "1", 0.0, -1e4, 1e4, f"open-loop command at 0 V; {_UNVERIFIED}", "rig"),
     Parameter("position_unit", "", "m", 1e-6, 1e-12, 1.0, "length of one unit of POS?", "manual of the controller"),
     Parameter("safe_voltage", "u_s", "V", 0.0, -1e4, 1e4, "drive voltage of the stage at rest", "rig"),
-    Parameter("max_slew_rate", "S", "V/s", 0.0, 0.0, 1e12, "steepest drive; has to be given", "rig"),
+    Parameter("max_slew_rate", "S", "V/s", 0.0, 0.0, 1e12, "steepest drive; required", "rig"),
     Parameter("voltage_tolerance", "", "V", 1.0, 1e-3, 1e3, "largest steady error of the piezo voltage", "rig"),
     Parameter("settling_time", "", "s", 0.01, 0.0, 10.0, "time the piezo voltage needs to follow a step", "rig"),
-    Parameter("timeout", "", "s", 2.0, 0.01, 600.0, "longest silence of the controller", "network"),
+    Parameter("timeout", "", "s", 2.0, 0.01, 600.0, "longest time without an answer of the controller", "network"),
 )
-"""Of the driver, under ``gcs2.``."""
+"""Parameters of the driver, declared under ``gcs2.``."""
 
 
 def open(values: Mapping[str, Any], opening: Opening) -> Stage:

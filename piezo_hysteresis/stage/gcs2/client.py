@@ -78,26 +78,26 @@ class Client:
         """The one value of an answer ``item=value`` or ``value``."""
         lines = self.ask(text)
         if len(lines) != 1:
-            raise self.nonsense(text, " ".join(lines), "one line")
+            raise self.invalid_answer(text, " ".join(lines), "one line")
         return lines[0].rpartition("=")[2].strip()
 
     def number(self, text: str, lowest: float = -math.inf, highest: float = math.inf) -> float:
-        """The one value of an answer, as a finite number from `lowest` to `highest`: other values are impossible."""
+        """The one value of an answer as a finite number from `lowest` to `highest`; Gcs2Error for any other value."""
         words = self.value(text)
         if not _NUMBER.fullmatch(words):
-            raise self.nonsense(text, words, "a number")
+            raise self.invalid_answer(text, words, "a number")
         number = float(words)
         if not math.isfinite(number):
-            raise self.nonsense(text, words, "a finite number")
+            raise self.invalid_answer(text, words, "a finite number")
         if not lowest <= number <= highest:
-            raise self.nonsense(text, words, f"a number from {lowest:g} to {highest:g}")
+            raise self.invalid_answer(text, words, f"a number from {lowest:g} to {highest:g}")
         return number
 
     def whole(self, text: str) -> int:
         """The one value of an answer, as a whole number that can be a count."""
         number = self.number(text, 0, LARGEST_COUNT)
         if number != int(number):
-            raise self.nonsense(text, f"{number:g}", "a whole number")
+            raise self.invalid_answer(text, f"{number:g}", "a whole number")
         return int(number)
 
     def array(self, text: str, rows: int, columns: int) -> ArrayAnswer:
@@ -116,7 +116,7 @@ class Client:
         except NoAnswerError as error:
             raise self._unanswered("#9", error) from None
         if not _MASK.fullmatch(words):
-            raise self.nonsense("#9", words, "a hexadecimal number")
+            raise self.invalid_answer("#9", words, "a hexadecimal number")
         return int(words, 16)
 
     def stop(self) -> None:
@@ -129,7 +129,7 @@ class Client:
         if number != STOPPED_BY_COMMAND:
             self._check("#24", number)
 
-    def nonsense(self, text: str, got: str, expected: str) -> Gcs2Error:
+    def invalid_answer(self, text: str, got: str, expected: str) -> Gcs2Error:
         """Error for an impossible answer. The link is closed, because further answers cannot be trusted."""
         self.connection.close()
         return Gcs2Error(f"{self.connection.place}: got '{got[:60]}' to '{text}', expected {expected}")
@@ -148,7 +148,7 @@ class Client:
             self.connection.close()
             raise Gcs2Error(f"{error} to ERR? after '{_short(text)}'") from None
         if not _ERROR_NUMBER.fullmatch(words):
-            raise self.nonsense("ERR?", words, "an error number")
+            raise self.invalid_answer("ERR?", words, "an error number")
         return int(words)
 
     def _check(self, text: str, number: int) -> None:

@@ -51,7 +51,7 @@ class Gcs2Setup:
     safe_voltage : float
         Drive voltage of the stage at rest [V].
     max_slew_rate : float
-        Steepest drive [V/s], and rate of the way to the safe voltage unless a driver has a lower one; has to be given.
+        Steepest drive [V/s], and rate of the ramp to the safe voltage unless a driver sets a lower one; required.
     voltage_tolerance : float
         Largest steady difference between requested and measured piezo voltage [V].
     settling_time : float
@@ -67,7 +67,8 @@ class Gcs2Setup:
     longest_multiple : int
         Largest multiple of the servo time that can be a sample period [U].
     servo_time_parameter, recorder_parameter : int
-        Numbers of the controller parameters servo time [s] and recorder points shared by all tables [U] beyond E-727.
+        Numbers of the controller parameters that hold the servo time and the number of recorder points of all tables
+        together. The defaults are those of an E-727; other controllers have other numbers [U].
     timeout : float
         Longest time without an answer of the controller [s].
 

@@ -198,7 +198,7 @@ class Gcs2Stage:
             raise StageError(f"{error}; {self._unknown()}") from None
 
     def close(self) -> None:
-        """Make safe and close the link; every later call but `close` and `safe` raises StageError."""
+        """Go to the safe voltage and close the link; every later call but `close` and `safe` raises StageError."""
         try:
             self.safe()
         finally:
@@ -241,7 +241,7 @@ class Gcs2Stage:
         """Ramp to a voltage [V] with the samples of the limiter, on the servo clock; the servo is off."""
         self._waveform = None
         longest = cast(int, self._description.longest_block)
-        for part in self._limiter.way(self._voltage, goal, self._axis.servo_time, longest):
+        for part in self._limiter.ramp(self._voltage, goal, self._axis.servo_time, longest):
             if part.size > 1:
                 self._axis.follow(part)
             else:

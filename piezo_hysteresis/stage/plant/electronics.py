@@ -56,7 +56,7 @@ class Electronics(Group):
         return 2 * self.dac_range / 2**self.dac_bits if self.dac_bits else 0.0
 
     def convert(self, voltage: Samples) -> Samples:
-        """Output of the converter [V]: the nearest of its steps within the drive limits."""
+        """Output of the converter [V]: the nearest step within the drive limits."""
         if not self.dac_bits:
             return np.array(voltage)
         half = 2 ** (self.dac_bits - 1)

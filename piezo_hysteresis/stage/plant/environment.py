@@ -48,12 +48,14 @@ class Environment(Group):
     coupling: float = quantity(
         0.0, "1", -1.0, 1.0, "hidden effect: share of the motion of the other axis that the sensor measures"
     )
-    other_amplitude: float = quantity(0.0, "m", 0.0, 1.0, "motion of the other axis; 0 where there is none")
-    other_frequency: float = quantity(3.0, "Hz", 1e-3, 1e4, "its frequency")
+    other_amplitude: float = quantity(
+        0.0, "m", 0.0, 1.0, "amplitude of the motion of the other axis; 0 if there is none"
+    )
+    other_frequency: float = quantity(3.0, "Hz", 1e-3, 1e4, "frequency of the motion of the other axis")
 
 
 class Surroundings:
-    """State of the environment from absolute time `time` [s]; `phases` holds random phases in turns."""
+    """State of the environment from absolute time `time` [s]; `phases` are random phases as fractions of 2π."""
 
     def __init__(self, environment: Environment, sample_period: float, time: float, phases: Samples) -> None:
         e = environment

@@ -39,7 +39,7 @@ Samples = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Hysteresis(Group):
-    """w = p1 v³ + p2 v + p_even2 v² + p_even4 v⁴ + h + Σ c_i play(v, r_i) with v = drive / `voltage_scale`.
+    """w = p1 v³ + p2 v + even2 v² + even4 v⁴ + h + Σ c_i play(v, r_i) with v = drive / `voltage_scale`.
 
     At rest h = `initial_state` and every play is centred on v. The defaults are the parameters the paper identified.
     """
@@ -52,16 +52,18 @@ class Hysteresis(Group):
     p2: float = quantity(2.1925, "1", 0.0, 10.0, "linear part")
     even2: float = quantity(0.0, "1", -10.0, 10.0, "hidden effect: quadratic part")
     even4: float = quantity(0.0, "1", -10.0, 10.0, "hidden effect: quartic part")
-    phi1: float = quantity(0.0, "1", -100.0, 100.0, "hidden effect: asymmetry, dv·h")
-    phi2: float = quantity(0.0, "1", -100.0, 100.0, "hidden effect: asymmetry, |dv|·|h|")
+    phi1: float = quantity(0.0, "1", -100.0, 100.0, "hidden effect: asymmetry of the loop, coefficient of dv·h")
+    phi2: float = quantity(0.0, "1", -100.0, 100.0, "hidden effect: asymmetry of the loop, coefficient of |dv|·|h|")
     exponent: float = quantity(1.0, "1", 1.0, 5.0, "hidden effect: Bouc-Wen n above 1")
     reference_state: float = quantity(0.2, "1", 1e-6, 10.0, "state at which the exponent changes nothing")
     rate_gain: float = quantity(0.0, "1", -1.0, 1.0, "hidden effect: growth of the loop with ln|dv/dt|")
-    rate_exponent: float = quantity(0.1, "1", 0.01, 2.0, "exponent of the rate law, 0 would be logarithmic")
-    rate_time: float = quantity(200e-6, "s", 1e-6, 1.0, "memory of the rate, a lag on |dv/dt|")
+    rate_exponent: float = quantity(0.1, "1", 0.01, 2.0, "exponent of the rate law; near 0 it is logarithmic")
+    rate_time: float = quantity(200e-6, "s", 1e-6, 1.0, "time constant of the lag on |dv/dt|")
     initial_state: float = quantity(0.0, "1", -10.0, 10.0, "hidden effect: h of the settled stage")
-    backlash: float = quantity(0.0, "V", 0.0, 100.0, "hidden effect: half width of a dead band of the drive")
-    play_radii: tuple[float, ...] = quantity((), "1", 0.0, 10.0, "radii r_i of plays; hidden effect beside Bouc-Wen")
+    backlash: float = quantity(
+        0.0, "V", 0.0, 100.0, "hidden effect: half width of the backlash between drive and piezo"
+    )
+    play_radii: tuple[float, ...] = quantity((), "1", 0.0, 10.0, "radii r_i of plays; with Bouc-Wen a hidden effect")
     play_weights: tuple[float, ...] = quantity((), "1", -10.0, 10.0, "weights c_i of plays")
 
     def __post_init__(self) -> None:
@@ -98,7 +100,7 @@ class Hysteresis(Group):
         return replace(off, play_radii=tuple(radii.tolist()), play_weights=tuple(weights.tolist()))
 
     def rise(self, start: float, stop: float) -> float:
-        """Change of w when the settled operator is driven from `start` to `stop` [V], at the rate of reference."""
+        """Change of w when the settled operator is driven from `start` to `stop` [V]; the rate has no influence."""
         operator = Operator(replace(self, rate_gain=0.0), Clock.cut(1.0, 0.0, 1.0), start)
         return float(operator.run(np.linspace(start, stop, 1001))[-1] - operator.rest)
 

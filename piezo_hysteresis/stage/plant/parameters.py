@@ -46,7 +46,7 @@ _SUB_STEP = Parameter("sub_step", "δ", "s", 5e-6, 1e-8, 1e-3, "longest internal
 
 @dataclass(frozen=True)
 class PlantParameters:
-    """The simulated stage, part by part in the order of the chain; SI units; every hidden effect off by default.
+    """The simulated stage, part by part in the order of the chain, in SI units. Hidden effects are off by default.
 
     Parameters
     ----------
@@ -142,7 +142,9 @@ class PlantParameters:
             part, _, quantity = name.partition(".")
             known = {row.name for row in _GROUPS[part].table()} if part in _GROUPS else set()
             if quantity not in known:
-                expected = f"one of {', '.join(sorted(known))}" if known else f"a part of {', '.join(_GROUPS)}"
+                expected = (
+                    f"one of {', '.join(sorted(known))}" if known else f"part.quantity, part: {', '.join(_GROUPS)}"
+                )
                 raise ParameterError(f"{name!r}: unknown quantity of the simulated stage, expected {expected}")
             changes.setdefault(part, {})[quantity] = value
         parts = {part: replace(getattr(self, part), **new) for part, new in changes.items()}

@@ -48,11 +48,13 @@ class Reading(NamedTuple):
 class Plant:
     """A simulated stage: its parameters and its physical state.
 
-    The chain is converter with hold → dead time → amplifier → backlash → hysteresis → creep → modes, softening → other
-    axis → sensor → drift, hum, noise → converter. Every part is advanced by its exact solution over sub-steps of at
-    most `PlantParameters.sub_step`, so results do not depend on how the drive is cut into blocks, bit for bit. Only the
-    curvature of the hysteresis within a sub-step is neglected. It is 5e-7 of the full stroke rms for a 2.5 V sine of
-    400 Hz and at most 4e-4 during the first microseconds of a 5 V step; it falls with the square of the sub-step.
+    The chain is converter with hold → dead time → amplifier → backlash → hysteresis → creep → modes, softening → poles
+    of the sensor → other axis → sensor nonlinearity → drift, hum, noise → converter. Every part is advanced over
+    sub-steps of at most `PlantParameters.sub_step`, so results do not depend on how the drive is cut into blocks, bit
+    for bit. The solutions over a sub-step are exact, except for softening and an exponent other than 1, and they
+    neglect the curvature of the hysteresis. The error is 5e-7 of the full stroke rms for a sine of 400 Hz with an
+    amplitude of 2.5 V, and at most 4e-4 during the first 0.1 ms of a 5 V step; it falls with the square of the
+    sub-step.
 
     Parameters
     ----------

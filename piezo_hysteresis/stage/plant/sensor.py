@@ -40,8 +40,12 @@ class Sensor(Group):
 
     bandwidth: float = quantity(7573.0, "Hz", 0.0, 1e9, "corner frequency of each pole; 0 for an unlimited sensor")
     poles: int = quantity(1, "1", 1, 6, "number of poles")
-    quadratic: float = quantity(0.0, "1", -0.2, 0.2, "hidden effect: s2")
-    cubic: float = quantity(0.0, "1", -0.2, 0.2, "hidden effect: s3")
+    quadratic: float = quantity(
+        0.0, "1", -0.2, 0.2, "hidden effect: s2 of x + X [s2 (x/X)² + s3 (x/X)³], X the full stroke"
+    )
+    cubic: float = quantity(
+        0.0, "1", -0.2, 0.2, "hidden effect: s3 of x + X [s2 (x/X)² + s3 (x/X)³], X the full stroke"
+    )
     offset: float = quantity(0.0, "m", -1.0, 1.0, "reading at rest without drive")
     range: float = quantity(60e-6, "m", 1e-9, 1.0, "the converter spans ± this displacement")
     adc_bits: int = quantity(16, "1", 0, 32, "resolution of the converter; 0 for an ideal one")
@@ -78,7 +82,7 @@ class Noise:
     """Sensor noise as a stream of samples. It is the same for one seed, for every size of the blocks.
 
     White noise of a fixed rms per sample, and 1/f noise as white noise through a cascade of one pole and one zero per
-    decade, from 0.01 Hz to half the sample rate; both start with the stage.
+    decade, from 0.01 Hz to half the sample rate. The cascade starts from zero.
     """
 
     def __init__(self, sensor: Sensor, full: float, sample_period: float, seed: np.random.SeedSequence) -> None:

@@ -15,8 +15,9 @@
 """Mechanics: two modes, an optional third, softening, and the poles of the sensor, in one state space.
 
 They are discretised exactly by matrix exponentials for the real shape of w: between two converter steps the amplifier
-output, and with it w, approaches its end exponentially with the amplifier's time constant. Only the curvature of the
-hysteresis within one sub-step is neglected. It is of second order in a step that is a fraction of a sample.
+output, and with it w, approaches its end exponentially with the amplifier's time constant. The curvature of the
+hysteresis within one sub-step is neglected, and the force of softening is taken as linear there. Both errors are of
+second order in a step that is a fraction of a sample.
 """
 
 from __future__ import annotations
@@ -41,9 +42,9 @@ Samples = NDArray[np.float64]
 class Structure(Group):
     """Mechanics: a parallel sum of modes, x = `dc_gain` · `displacement_scale` · Σ share_i M_i(s) w.
 
-    With the electronics and the sensor, the default frequencies and dampings were fitted to the frequency and step
-    response of the published ARX model (paper, Sec. 3.3): its dc gain, its 98.5 µs of lag near dc, its onset 60 µs
-    after a step.
+    M_i(s) is the transfer function of mode i, 1 at s = 0. The default frequencies and dampings were fitted, together
+    with the electronics and the sensor, to the frequency and step response of the published ARX model (paper,
+    Sec. 3.3): its dc gain, its group delay of 98.5 µs near dc, and its onset 60 µs after a step.
     """
 
     dc_gain: float = quantity(0.24641, "1", 1e-6, 1e6, "normalised displacement over w of the settled stage")
@@ -53,11 +54,17 @@ class Structure(Group):
     share1: float = quantity(0.843, "1", -2.0, 2.0, "share of the first mode in the static displacement")
     frequency2: float = quantity(12180.0, "Hz", 1.0, 1e6, "natural frequency of the second mode")
     damping2: float = quantity(0.0248, "1", 1e-4, 1.0, "damping ratio of the second mode")
-    softening_quadratic: float = quantity(0.0, "1", -0.5, 2.0, "hidden effect: k(1 + k2 |x|/X), X the full stroke")
-    softening_cubic: float = quantity(0.0, "1", -0.3, 2.0, "hidden effect: k(1 + k3 x²/X²)")
-    resonance_share: float = quantity(0.0, "1", -0.5, 0.5, "hidden effect: share of x that passes one more resonance")
-    resonance_frequency: float = quantity(1800.0, "Hz", 1.0, 1e6, "natural frequency of that resonance")
-    resonance_damping: float = quantity(0.01, "1", 1e-4, 1.0, "its damping ratio")
+    softening_quadratic: float = quantity(
+        0.0, "1", -0.5, 2.0, "hidden effect: k2 of the stiffness k (1 + k2 |x|/X), X the full stroke"
+    )
+    softening_cubic: float = quantity(
+        0.0, "1", -0.3, 2.0, "hidden effect: k3 of the stiffness k (1 + k3 x²/X²), X the full stroke"
+    )
+    resonance_share: float = quantity(
+        0.0, "1", -0.5, 0.5, "hidden effect: share of x that passes through an extra resonance"
+    )
+    resonance_frequency: float = quantity(1800.0, "Hz", 1.0, 1e6, "natural frequency of the extra resonance")
+    resonance_damping: float = quantity(0.01, "1", 1e-4, 1.0, "damping ratio of the extra resonance")
 
     @property
     def gain(self) -> float:

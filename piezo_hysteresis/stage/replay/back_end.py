@@ -29,9 +29,11 @@ from .stage import ReplayStage
 PARAMETERS: tuple[Row, ...] = (
     Setting("experiment", "", "path of the recording"),
     Setting("repeat", False, "begin again after the last sample"),
-    Setting("subscribers", 0, "number of subscribers of samples for which the beginning waits", lower=0, upper=1000),
+    Setting(
+        "subscribers", 0, "the replay begins when the topic samples has this number of subscribers", lower=0, upper=1000
+    ),
 )
-"""Of the driver, under ``replay.``."""
+"""Parameters of the driver, declared under ``replay.``."""
 
 
 def open(values: Mapping[str, Any], opening: Opening) -> Stage:

@@ -105,12 +105,12 @@ class ReplayStage:
 
     @property
     def sample_period(self) -> float:
-        """Sample period of the recording [s]."""
+        """Time between played samples [s]."""
         return self._description.sample_period_min
 
     @property
     def voltage(self) -> float:
-        """Recorded voltage of the sample played last [V]; before the first one, of that."""
+        """Recorded voltage of the sample played last [V]; before the replay begins, that of the first sample."""
         return float(self._values(self._last, _voltage_of)[0][0])
 
     @property
@@ -124,7 +124,7 @@ class ReplayStage:
         return self._played[self._places(np.array([min(self._position, self._ends[-1] - 1)]))[0]].record
 
     def configure(self, sample_period: float) -> None:
-        """Accept the recording's own sample period [s]; StageError for any other."""
+        """Accept the sample period at which the recording is played [s]; StageError for any other."""
         self._require_open()
         self._description.check_sample_period(sample_period)
 

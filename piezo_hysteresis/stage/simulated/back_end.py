@@ -33,16 +33,18 @@ _PLANT = PlantParameters.table()
 """Parameters of the simulated plant."""
 
 PARAMETERS: tuple[Row, ...] = (
-    Setting("seed", 0, "fixes noise and random phases", lower=0, upper=2**31 - 1),
-    Setting("memory", False, "true for a stage with on-board memory: upload, run, read"),
+    Setting("seed", 0, "seed of the noise and of all random phases", lower=0, upper=2**31 - 1),
+    Setting("memory", False, "true for a stage with on-board memory, which plays and records whole waveforms"),
     Setting("longest_block", 32768, "largest number of samples in the memory", lower=2, upper=2**31 - 1),
-    Parameter("dead_time", "t_d", "s", 0.05, 0.0, 100.0, "time that arming takes", "simulated plant"),
-    Setting("hidden_effect", -1, "seed that draws one effect to hide; -1: nothing hidden", lower=-1, upper=2**31 - 1),
-    Setting("plant_file", "", "YAML file of plant parameters, which then replace the ones below"),
-    Setting("hysteresis.operator", "bouc_wen", "hysteresis of the plant", ("bouc_wen", "prandtl_ishlinskii")),
+    Parameter("dead_time", "t_d", "s", 0.05, 0.0, 100.0, "time that arming a waveform takes", "simulated plant"),
+    Setting("hidden_effect", -1, "seed that draws a hidden effect; -1: no hidden effect", lower=-1, upper=2**31 - 1),
+    Setting(
+        "plant_file", "", "YAML file of plant parameters; all other plant parameters of the driver are then ignored"
+    ),
+    Setting("hysteresis.operator", "bouc_wen", "kind of hysteresis of the plant", ("bouc_wen", "prandtl_ishlinskii")),
     *_PLANT,
 )
-"""Of the driver, under ``simulated.``."""
+"""Parameters of the driver, declared under ``simulated.``."""
 
 
 def open(values: Mapping[str, Any], opening: Opening) -> Stage:

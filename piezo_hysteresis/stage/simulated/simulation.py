@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Simulation`: a plant behind the limits and the slow path of a stage."""
+"""`Simulation`: a simulated plant with the limits and the slow path of a stage."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _LONGEST_PERIOD = 10e-3
 
 
 class Simulation:
-    """Base of both kinds of simulated stage: a plant behind limits, single set-points, and phases played from rest."""
+    """Base of both kinds of simulated stage: a plant with limits, single set-points, and whole phases."""
 
     def __init__(
         self,
@@ -83,12 +83,12 @@ class Simulation:
 
     @property
     def sample_period(self) -> float:
-        """Sample period in force [s]."""
+        """Present sample period [s]."""
         return self._sample_period
 
     @property
     def voltage(self) -> float:
-        """Drive voltage in force [V]."""
+        """Present drive voltage [V]."""
         return self._plant.voltage
 
     @property
@@ -109,7 +109,7 @@ class Simulation:
         self._limiter = Limiter(self._description).restricted(limits, ramp_rate)
 
     def set_voltage(self, voltage: float) -> None:
-        """Go to one voltage [V] at the ramp rate and hold it; one sample of simulated time where nothing limits it."""
+        """Go to one voltage [V] at the ramp rate and hold it; without a ramp rate this takes one sample."""
         self._require_ready()
         self._go(self._limiter.goal(voltage))
 
@@ -154,11 +154,11 @@ class Simulation:
         phase : str
             Name of the phase.
         initial_voltage : float, optional
-            Voltage at which the stage has settled before [V]; default the first voltage.
+            Voltage at which the stage has settled before [V]; default the first voltage. Unused with `continues`.
         continues : bool
             True to continue from the present state of the stage.
         average : int
-            Slow phases: simulated at the sample period of the stage, then averaged over blocks of so many samples.
+            Number of samples of the stage that are averaged to one recorded sample, for slow phases.
 
         Returns
         -------
@@ -199,7 +199,7 @@ class Simulation:
         return self._limiter.check(voltage, start, self._sample_period)
 
     def _go(self, voltage: float) -> None:
-        for part in self._limiter.way(self.voltage, voltage, self._sample_period):
+        for part in self._limiter.ramp(self.voltage, voltage, self._sample_period):
             self._plant.run(part)
 
     def _run(self, voltage: Samples) -> Reading:

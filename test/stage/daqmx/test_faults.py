@@ -81,7 +81,7 @@ def test_a_link_lost_while_opening_is_reported_and_moves_nothing(rig, step):
         ("wrong_clock", "samples every 4e-05 s, expected 2e-05 s"),
         ("saturated", r"measured a drive of 5\S* V at sample \d+, expected .* V .*saturated"),
         ("stale@StartTask", "displacement stayed at exactly"),
-        ("swapped", "channels exchanged"),
+        ("swapped", "channels are exchanged"),
     ],
 )
 def test_every_failure_is_reported_clearly_and_ends_safe(rig, streamed, fault, message):

@@ -87,7 +87,7 @@ def test_a_lost_link_leaves_the_voltage_unknown_and_is_reported(bench, play, ste
         ("saturated", r"measured a drive of 5\S* V at sample \d+, expected 9 V .*saturated"),
         ("stale@WGO", "displacement stayed at exactly"),
         ("duplicated", "the same 500 recorded samples twice"),
-        ("swapped", "channels exchanged"),
+        ("swapped", "channels are exchanged"),
         ("servo_on", "servo of axis 1 is on after it was switched off"),
         ("servo_on@WGO", "servo of axis 1 is on after the run"),
     ],
