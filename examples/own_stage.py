@@ -142,7 +142,7 @@ class OwnStage:
         self._closed = True
 
     def _go(self, voltage: float) -> None:
-        for part in self._limiter.way(self._voltage, voltage, 1e-3):
+        for part in self._limiter.ramp(self._voltage, voltage, 1e-3):
             for level in part:
                 self._move(float(level))
                 time.sleep(1e-3)

@@ -96,9 +96,10 @@ def long_files(paths: list[Path]) -> Iterator[str]:
 
 
 def bare_constants(modules: dict[Path, ast.Module]) -> Iterator[str]:
-    """Module constants (capitals) that no docstring follows."""
+    """Constants (capitals) of a module or a class that no docstring follows."""
     for path, tree in modules.items():
-        for node, following in zip_longest(tree.body, tree.body[1:]):
+        classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+        for node, following in (pair for owner in (tree, *classes) for pair in zip_longest(owner.body, owner.body[1:])):
             names = _constants(node)
             if names and not _is_docstring(following):
                 where = f"{path.relative_to(ROOT)}:{node.lineno}"

@@ -136,7 +136,10 @@ class Effect(ABC):
 
     def __getitem__(self, name: str) -> float:
         value = self._values[name]
-        assert not isinstance(value, tuple)
+        if isinstance(value, tuple):
+            raise ParameterError(
+                f"{self.name}.{name}: got an array parameter, expected a scalar one; use array('{name}')"
+            )
         return value
 
     def array(self, name: str) -> np.ndarray:

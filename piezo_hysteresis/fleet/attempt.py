@@ -40,11 +40,17 @@ class RowStatus(StrEnum):
     """Result of the work on a recording."""
 
     DONE = "done"
+    """The row holds the result of the task."""
     FAILED = "failed"
+    """The recording could not be read, or the task ended with an error."""
     TIMED_OUT = "timed_out"
+    """There was no result within the time limit."""
     UNREACHABLE = "unreachable"
+    """The recording could not be fetched from its storage."""
     KILLED = "killed"
+    """The worker process ended in every attempt."""
     UNCHANGED = "unchanged"
+    """The data equal those of the existing row, which is kept."""
 
 
 class OtherCodeError(PiezoError):

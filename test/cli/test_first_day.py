@@ -212,6 +212,21 @@ def test_the_verdict_is_the_last_line_and_force_replaces(tmp_path, plain):
     assert done.stdout.splitlines()[-1].startswith("Verdict: The model does not describe this stage: its error is ")
 
 
+def test_a_verdict_states_how_far_the_error_is_above_the_noise(tmp_path, plain):
+    """A lag of 10 ms more is 2 % of the range at 1 Hz: a model with this error does not describe all of the stage."""
+    noise = np.random.default_rng(1).normal(size=TIME.size) * 0.01
+    for name, shift in (("same", 0), ("late", 2)):
+        rows = np.column_stack((TIME, VOLTAGE, np.interp(TIME - 5e-3 * shift, TIME, MICRONS) + noise))
+        table(tmp_path / f"{name}.csv", "time_s,voltage_V,displacement_um\n", rows)
+    piezo("identify", tmp_path / "same.csv", "-o", tmp_path / "model.yaml")
+    said = {
+        n: piezo("validate", tmp_path / "model.yaml", tmp_path / f"{n}.csv").stdout.splitlines()[-1]
+        for n in ("same", "late")
+    }
+    assert "This error is at the noise floor: only noise remains." in said["same"]
+    assert "times its noise floor" in said["late"]
+
+
 def test_an_undetermined_fit_is_reported_with_status_1(tmp_path):
     from types import SimpleNamespace
 

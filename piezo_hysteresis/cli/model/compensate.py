@@ -42,10 +42,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser("compensate", description=__doc__)
     parser.add_argument("model", metavar="MODEL", help="model file")
     parser.add_argument("path", metavar="PATH", help="CSV (time_s,displacement_um) or NPZ with the wanted displacement")
-    parser.add_argument("-o", "--output", metavar="FILE", default="command.npz", help="default: command.npz")
-    parser.add_argument("--voltage-min", metavar="V", type=float, default=0.0, help="default: 0")
-    parser.add_argument("--voltage-max", metavar="V", type=float, default=10.0, help="default: 10")
-    parser.add_argument("--max-slew-rate", metavar="V/S", type=float, default=math.inf, help="default: no limit")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", default="command.npz", help="file of the drive voltage (default: command.npz)"
+    )
+    parser.add_argument("--voltage-min", metavar="V", type=float, default=0.0, help="lowest drive voltage (default: 0)")
+    parser.add_argument(
+        "--voltage-max", metavar="V", type=float, default=10.0, help="highest drive voltage (default: 10)"
+    )
+    parser.add_argument(
+        "--max-slew-rate", metavar="V/S", type=float, default=math.inf, help="steepest drive (default: no limit)"
+    )
     parser.add_argument(
         "--rest-voltage", metavar="V", type=float, default=0.0, help="voltage at which the stage rests before the path"
     )

@@ -54,17 +54,28 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "(default: piezo)",
     )
     parser.add_argument("--no-inverse", action="store_true", help="write the prediction only")
-    parser.add_argument("--voltage-min", metavar="V", type=float, default=0.0, help="limit of the inverse (default: 0)")
     parser.add_argument(
-        "--voltage-max", metavar="V", type=float, default=10.0, help="limit of the inverse (default: 10)"
+        "--voltage-min", metavar="V", type=float, default=0.0, help="lowest drive voltage of the inverse (default: 0)"
     )
     parser.add_argument(
-        "--max-slew-rate", metavar="V/S", type=float, default=math.inf, help="limit of the inverse (default: no limit)"
+        "--voltage-max",
+        metavar="V",
+        type=float,
+        default=10.0,
+        help="highest drive voltage of the inverse (default: 10)",
+    )
+    parser.add_argument(
+        "--max-slew-rate",
+        metavar="V/S",
+        type=float,
+        default=math.inf,
+        help="steepest drive of the inverse (default: no limit)",
     )
     parser.add_argument(
         "--no-band",
         action="store_true",
-        help="leave out the low-pass of the wanted displacement: less preview, but kinks need unlimited voltages",
+        help="omit the low-pass of the wanted displacement: less preview is needed, but kinks of the path need very "
+        "large voltages",
     )
     add_force(parser)
     parser.set_defaults(run=run)

@@ -28,5 +28,5 @@ def add_operator(parser: argparse._ActionsContainer) -> None:
         metavar="NAME",
         choices=OPERATORS,
         default=HYSTERESIS.name,
-        help=f"operator to identify: {', '.join(OPERATORS)} (default: {HYSTERESIS.name})",
+        help=f"hysteresis operator to identify: {', '.join(OPERATORS)} (default: {HYSTERESIS.name})",
     )

@@ -58,14 +58,15 @@ def add_reading_group(parser: argparse.ArgumentParser) -> None:
         metavar="CHANNEL=PLACE",
         action="append",
         default=[],
-        help="column number from 1, name, or /topic.field; e.g. displacement=5 (repeatable)",
+        help="column of a channel: its number from 1, its name, or /topic.field; e.g. displacement=5 (repeatable)",
     )
     group.add_argument(
         "--unit",
         metavar="CHANNEL=UNIT",
         action="append",
         default=[],
-        help="e.g. displacement=um; or the SI value of one count, 2e-6 for a sensor of 2 um/V (repeatable)",
+        help="unit of a channel, e.g. displacement=um, or its SI value, e.g. displacement=2e-6 for a sensor of 2 um/V "
+        "(repeatable)",
     )
     group.add_argument("--sample-period", metavar="S", type=float, help="time between samples [s]")
     group.add_argument(
@@ -75,21 +76,23 @@ def add_reading_group(parser: argparse.ArgumentParser) -> None:
         help="drive voltage at which the stage rested before every phase [V]",
     )
     group.add_argument(
-        "--rows", metavar="FROM:TO", help="range of rows to read, as a Python slice; rows before it determine the state"
+        "--rows",
+        metavar="FROM:TO",
+        help="range of rows to read, as a Python slice; rows before it determine the state at its beginning",
     )
     group.add_argument(
         "--phase",
         metavar="[TIME=]NAME",
         action="append",
         default=[],
-        help="name of the only phase, or start time [s] and name of each (repeatable)",
+        help="name of the only phase, or start time [s] and name of each phase (repeatable)",
     )
     group.add_argument(
         "--include",
         metavar="NAME",
         action="append",
         default=[],
-        help="keep phases that are otherwise left out: idle, hold",
+        help="phase to keep that is otherwise left out: idle, hold (repeatable)",
     )
     group.add_argument(
         "--average",

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``piezo diagnose --stage``: the gap finder plays phases to a stage, and stops when the answer is sure."""
+"""``piezo diagnose --stage``: the gap finder plays phases to a stage, and stops when the answer is certain."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ def add_stage_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--stage",
         metavar="FILE",
-        help="play to this stage: plant parameters of a simulated one, or a parameter file of the driver",
+        help="stage to drive: file of plant parameters of a simulated one, or parameter file of the driver",
     )
     group.add_argument(
         "--error-rate",
         type=float,
         default=ERROR_RATE,
         metavar="P",
-        help=f"probability of a wrong answer at which it stops (default: {ERROR_RATE:g})",
+        help=f"accepted probability of a wrong answer (default: {ERROR_RATE:g})",
     )
     group.add_argument(
         "--stage-time",
@@ -70,7 +70,7 @@ def add_stage_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
-    """Play, record and decide until the answer is sure. The recording is written also after an error.
+    """Play, record and decide until the answer is certain. The recording is written also after an error.
 
     Parameters
     ----------
@@ -95,7 +95,6 @@ def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
                 error_rate=args.error_rate,
                 longest=args.stage_time,
                 seed=args.seed,
-                explicit_step=not args.no_explicit_step,
             )
             _show_plan(session, live)
             started = time.monotonic()
@@ -132,8 +131,8 @@ def _show_plan(session: DriverSession, live: LiveDiagnosis) -> None:
         names = ", ".join(dict.fromkeys(p.name for p in tier.phases))
         out.print(f"  {number}. {tier.name}: {tier.duration:.1f} s ({names})", highlight=False)
     out.print(
-        f"  It stops as soon as the answer is sure at an error rate of {100 * live.error_rate:g} %. Further drives "
-        f"inside the same limits may follow where rivals remain, up to {live.longest:g} s in all.",
+        f"  It stops as soon as the answer is certain at an error rate of {100 * live.error_rate:g} %. If several "
+        f"explanations remain, further drives inside the same limits may follow, up to {live.longest:g} s in all.",
         highlight=False,
     )
 

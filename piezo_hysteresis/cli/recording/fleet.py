@@ -55,11 +55,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "-o", "--output", metavar="FOLDER", required=True, help="folder of the results, new or existing"
     )
-    parser.add_argument("--task", choices=TASKS, default=TASKS[0], help=f"task (default: {TASKS[0]})")
-    parser.add_argument("--model", metavar="FILE", help="model file to validate, or start of a diagnosis")
+    parser.add_argument(
+        "--task", choices=TASKS, default=TASKS[0], help=f"what to do with every recording (default: {TASKS[0]})"
+    )
+    parser.add_argument("--model", metavar="FILE", help="model file to validate, or to start a diagnosis from")
     add_operator(parser)
     parser.add_argument(
-        "--time-limit", metavar="S", type=float, default=TIME_LIMIT, help="per recording (default: %(default)g s)"
+        "--time-limit",
+        metavar="S",
+        type=float,
+        default=TIME_LIMIT,
+        help="time limit per recording [s] (default: %(default)g)",
     )
     parser.add_argument("--retry", action="store_true", help="try recordings again that failed, timed out or crashed")
     parser.add_argument(
@@ -117,7 +123,7 @@ def _worked(args: argparse.Namespace, folder: Path) -> int:
     out = console()
     with Results(folder) as results:
         orders = open_orders(sources, work, results, reading=reading, limit=args.time_limit, retry=args.retry)
-        out.print(f"{len(sources)} recordings, {len(sources) - len(orders)} of them with a row that is up to date")
+        out.print(f"recordings: {len(sources)}; with an up-to-date row: {len(sources) - len(orders)}")
         if orders:
             with (
                 cluster(args.scheduler, args.workers) as client,
@@ -126,7 +132,7 @@ def _worked(args: argparse.Namespace, folder: Path) -> int:
                 out.print(run_fleet(orders, results, client, report_progress).sentence())
         without = sum(results.known[work.name, source.url].status != RowStatus.DONE for source in sources)
     if without:
-        out.print(f"{without} recordings have no result; the column `error` says why.")
+        out.print(f"without a result: {without} of {len(sources)}; the column `error` of the table gives the reason")
     out.print(f"wrote {folder}")
     return without
 

@@ -172,8 +172,7 @@ def _spread(found: FrequencyResponse) -> NDArray[np.intp]:
 def _linear_part(model: Model | None, gain_axis: object, phase_axis: object, data: dict[str, Array]) -> None:
     if model is None or Arx.name not in model or not model.has_hysteresis:
         return
-    g = model[Arx.name]
-    assert isinstance(g, Arx)
+    g = model.effect(Arx)
     f = np.geomspace(data["frequency_Hz_1"][0], data["frequency_Hz_1"][-1], 200)
     slope = model.hysteresis.turning_slope * model.displacement_scale / model.voltage_scale
     value = slope * g.response(f, model.sample_period)

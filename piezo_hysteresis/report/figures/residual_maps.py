@@ -83,8 +83,8 @@ def residual_maps(comparison: ModelComparison) -> Drawing | None:
         "residual_maps",
         "Residual against drive, displacement and rate",
         (
-            "Grey: frequency of a residual on a logarithmic scale. All phases have equal weight, "
-            "except those that begin in an unknown state. "
+            "Grey: how often a residual occurs, on a logarithmic scale. All phases have equal weight; "
+            "those that begin in an unknown state are left out. "
             "If the mean differs from zero, something is missing in the model. A mean that bends over "
             "u or y is a static nonlinearity. A mean that differs between rising and falling drive is "
             "hysteresis. A mean that grows with du/dt is a lag or a rate dependence."

@@ -82,8 +82,6 @@ def _sentences(
     if poor:
         named = ", ".join(f"{stage} ({count})" for stage, count in poor.most_common(5))
         yield f"Recordings with a larger error are most frequent at {named}; see piezo diagnose."
-    elif errors.size:
-        yield "No stage needs another kind of model."
     if outliers:
         names = list(dict.fromkeys(o.stage for o in outliers))
         first = f"the first in {outliers[0].parameter}"

@@ -39,8 +39,8 @@ def error_table(comparison: ModelComparison) -> Table | None:
     whole = len(now.judged) == len(now.rows)
     rows.append(
         (
-            "all phases" if whole else "known initial state",
-            f"{comparison.experiment.size}",
+            "all phases" if whole else "all from a known state",
+            f"{sum(row.size for row in now.judged)}",
             f"{floor:.3f}",
             *totals,
             _nm(now.rms),
@@ -63,7 +63,7 @@ def error_table(comparison: ModelComparison) -> Table | None:
         tuple(rows),
         f"The range is {1e6 * now.range:.4g} µm, peak to peak over the experiment. Every phase has the same weight in "
         "the last row"
-        + ("" if whole else ", except phases that begin in an unknown state (conditioning, truncated)")
+        + ("" if whole else ", which leaves out phases that begin in an unknown state (conditioning, truncated)")
         + (". Fit is 100·(1 − ‖e‖/‖y − mean y‖) within the phase. It has little meaning if the stage hardly moves."),
         frozenset(range(1, len(header))),
     )

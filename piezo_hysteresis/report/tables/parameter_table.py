@@ -26,9 +26,14 @@ from .table import Table
 ALIKE = 0.95
 """Correlation from which two parameters are hard to distinguish."""
 
+MOST_SHOWN = 4
+"""Largest number of array elements in the table; the model file contains all."""
+
 
 def parameter_table(model: Model, fit: Fit | None = None) -> Table:
     """Every scalar parameter of the model, with its 95 % interval if it was fitted; arrays in one row each.
+
+    A parameter at a bound has no interval: the data would move it beyond the bound.
 
     Parameters
     ----------
@@ -45,11 +50,10 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
             name, value = f"{effect.name}.{row.name}", effect.values[row.name]
             bounds = f"{row.lower:g} … {row.upper:g}"
             if isinstance(value, tuple):
-                numbers = ", ".join(f"{v:.4g}" for v in value) or "none"
-                shown = "fitted in each record" if row.per_record else numbers
+                shown = "fitted in each record" if row.per_record else _numbers(value)
                 rows.append((name, row.symbol, shown, "", row.unit, bounds, row.meaning))
                 continue
-            interval = f"± {sure[name]:.2g}" if name in sure else ""
+            interval = f"± {sure[name]:.2g}" if name in sure and name not in hit else ""
             message = f"{bounds}: at a bound" if name in hit else bounds
             rows.append((name, row.symbol, f"{value:.4g}", interval, row.unit, message, row.meaning))
     drive, stroke = model.voltage_scale, 1e6 * model.displacement_scale
@@ -69,6 +73,13 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
         note,
         frozenset({2, 3, 5}),
     )
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    """An array in one cell: a few numbers, or how many there are and their range."""
+    if len(values) > MOST_SHOWN:
+        return f"{len(values)} from {min(values):.4g} to {max(values):.4g}"
+    return ", ".join(f"{v:.4g}" for v in values) or "none"
 
 
 def _intervals(model: Model, fit: Fit | None) -> dict[str, float]:

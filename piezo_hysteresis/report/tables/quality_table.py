@@ -25,8 +25,8 @@ from ..words import duration
 from .table import Table
 
 _NOTE = (
-    "Lag is the delay of the displacement at the turning points of the drive (in samples). It "
-    "comes from the dynamics or from a delayed channel."
+    "Lag is the delay of the displacement at the turning points of the drive (in samples). It comes from the dynamics, "
+    "from a held drive (up to one sample), from creep in slow drives, or from a delayed channel."
 )
 """Explanation of the column of lags."""
 

@@ -38,7 +38,7 @@ def test_a_folder_of_recordings(piezo, folder, tmp_path):
     assert (row["stage"], row["month"], row["task"], row["status"]) == ("stage_x", "2026-11", "validate", "done")
     again = piezo(*command)
     assert again.status == 0
-    assert "1 of them with a row that is up to date" in again.out
+    assert "recordings: 1; with an up-to-date row: 1" in again.out
     page = tmp_path / "fleet.html"
     drawn = piezo("fleet", "-o", tmp_path / "results", "--task", "validate", "--report", page)
     assert drawn.status == 0, drawn.err

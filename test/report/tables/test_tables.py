@@ -20,7 +20,9 @@ import dataclasses
 
 import numpy as np
 
+from piezo_hysteresis.effects import Arx, BoucWen, HysteresisMemory
 from piezo_hysteresis.identification.fit.fit import Fit
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Notice
 from piezo_hysteresis.report.tables.error_table import error_table, frequency_table
 from piezo_hysteresis.report.tables.parameter_table import correlation_table, parameter_table
@@ -59,9 +61,18 @@ def test_parameters_show_intervals_bounds_hit_and_correlations(models):
     assert rows["bouc_wen.beta"][2:4] == ("4.607", "± 0.039")
     assert rows["creep.gamma"][5].endswith("at a bound")
     assert not rows["bouc_wen.A"][5].endswith("at a bound")
+    assert rows["creep.gamma"][3] == "", "at a bound, so no interval"
     assert rows["bouc_wen.gamma"][3] == "", "not fitted, so no interval"
     assert correlation_table(fit).rows == (("bouc_wen.p2", "bouc_wen.A", "-0.990"),)
     assert correlation_table(fitted(model, names, np.diag(np.diag(covariance)))) is None
+
+
+def test_a_long_array_leaves_room_for_the_table():
+    weights = tuple(0.01 * k for k in range(16))
+    model = Model((BoucWen(), HysteresisMemory(c=weights), Arx(a=(), b=(1.0,), delay=1.0)), 1e-3)
+    rows = {row[0]: row[2] for row in parameter_table(model).rows}
+    assert rows["hysteresis_memory.c"] == "16 from 0 to 0.15"
+    assert (rows["arx.a"], rows["arx.b"]) == ("none", "1")
 
 
 def test_the_data_are_reported_as_they_are(experiment, comparison):
