@@ -215,7 +215,6 @@ def acceptance(diagnosis: Diagnosis) -> Figure:
     if alone is not None:
         mark = {"marker": "D", "linestyle": "none", "color": BLACK, "label": "beside the model refitted without it"}
         gains.plot(alone.score.cost - fitted[0].score.cost, 0, **mark)
-        left.plot(100.0 * share_left(fitted[0].score, alone.score, null), 0, **mark)
     gains.set_yticks(at, [c.name for c in fitted])
     gains.invert_yaxis()
     gains.set(title="Gain", xlabel="G [1]")
