@@ -29,6 +29,8 @@ _DRIVE_MOVES = 0.05
 """Share of the range by which the drive must move for a constant displacement to be a defect."""
 _DRIVE_RETURNS = 0.01
 """The same at an extreme of the displacement, counted beyond both ends of the run."""
+_DEAD_TIME = 100
+"""Number of samples by which the displacement may follow the drive later, at most half of a constant displacement."""
 _RETURN = 0.03
 """Share of the range by which the displacement must continue and return while the voltage is constant."""
 _ARC = 0.9
@@ -81,9 +83,12 @@ def _stuck(record: Record) -> list[Notice]:
     at_rail = np.isin(y[runs[:, 0]], (y.min(), y.max()))
     low, high = _extremes(u, runs)
     first, last = u[runs[:, 0]], u[runs[:, 1] - 1]
+    before = runs.copy()  # a stage at rest stays where it is during the dead time after a step
+    before[:, 1] -= np.minimum(np.diff(runs).ravel() // 2, _DEAD_TIME)
+    moves = np.ptp(_extremes(u, before), axis=0)
     beyond = np.maximum(high - np.maximum(first, last), np.minimum(first, last) - low)
     # with backlash a stage also stands still after a turning point of the drive, but not across it
-    moved = (high - low > _DRIVE_MOVES * np.ptp(u)) | (at_rail & (beyond > _DRIVE_RETURNS * np.ptp(u)))
+    moved = (moves > _DRIVE_MOVES * np.ptp(u)) | (at_rail & (beyond > _DRIVE_RETURNS * np.ptp(u)))
     runs, at_rail, beyond = runs[moved], at_rail[moved], beyond[moved]
     cut = bool(beyond[at_rail].max(initial=0.0) > _SEVERE_CUT * np.ptp(u))
     notices = []

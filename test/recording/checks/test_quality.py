@@ -184,6 +184,14 @@ def test_a_stage_with_backlash_is_not_clipped():
     assert "clipped" not in kinds(Record(drive, stage(drive, noise=0.0, lag=1e-9) - 1.2e-6 * drive, PERIOD, "x"))
 
 
+@pytest.mark.parametrize("delay", [1, 10, 60])
+def test_a_stage_that_rests_until_a_step_arrives_is_not_stuck(delay):
+    drive = np.repeat([0.0, 5.0, 2.0], 500)
+    y = 1e-6 * np.repeat(drive[::500], 500)
+    y = np.concatenate([y[:1].repeat(delay), y[:-delay]])
+    assert not {"stuck", "clipped"} & kinds(Record(drive, y, PERIOD, "step"))
+
+
 def test_a_sensor_that_hangs_is_stuck():
     drive = sine()
     y = stage(drive)
