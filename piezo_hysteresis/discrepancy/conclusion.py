@@ -25,8 +25,8 @@ from ..identification.fit.normal_equations import Nuisance
 from ..record import Experiment
 from .diagnosis import Diagnosis, Verdict
 from .excitation_check import missing_excitation
-from .gap import Gap, measure_gap, stating
-from .next_experiment import decide
+from .gap import Gap, measure_gap, with_stated_error
+from .next_experiment import best_next_experiment
 from .residual.localise import ResidualShare
 from .search.baseline_setup import BaselineSetup
 from .search.refit import LAST, PRECISE, joint, restart
@@ -97,13 +97,13 @@ def concluded(
     return Diagnosis(
         conclusion=conclusion,
         reason=reason,
-        model=stating(final.stated_model, gap.live, setup.span),
-        baseline=stating(first.stated_model, gap.before, setup.span),
+        model=with_stated_error(final.stated_model, gap.live, setup.span),
+        baseline=with_stated_error(first.stated_model, gap.before, setup.span),
         selection=selection,
         fit=final,
         where=where,
         gap=gap,
-        next_experiment=decide(selection, training_data),
+        next_experiment=best_next_experiment(selection, training_data),
         experiment=experiment.noting(*missing_excitation([records[i] for i in setup.usable], found)),
         correction=best_correction(final.model, setup, selection.null) if is_unexplained else None,
     )

@@ -84,7 +84,7 @@ class DiagnosisState:
         return [i for i in self.usable if moves(self.experiment[i])]
 
     @property
-    def sharpens(self) -> bool:
+    def corrects_intersample_error(self) -> bool:
         """Whether the inter-sample error is corrected; not with a noisy voltage, whose averages reverse at random."""
         return all(n.kind != VOLTAGE_NOISE for n in self.experiment.notices)
 

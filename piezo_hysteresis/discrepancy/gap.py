@@ -86,7 +86,7 @@ class Gap:
         return after < (FALLS if before > ADEQUATE else 1.0) * before
 
 
-def stating(model: Model, percent: float, stroke: float) -> Model:
+def with_stated_error(model: Model, percent: float, stroke: float) -> Model:
     """The model with its free-run error in the provenance; `percent` is in % of the `stroke` [m]."""
     return replace(model, provenance={**model.provenance, **free_run(0.01 * percent * stroke, percent)})
 

@@ -146,7 +146,7 @@ def distances(
     return found
 
 
-def decide(selection: Selection, training_data: TrainingData) -> NextExperiment | None:
+def best_next_experiment(selection: Selection, training_data: TrainingData) -> NextExperiment | None:
     """The phase of `possible_phases` that best separates an accepted effect from its rival; None if no effect has one.
 
     Parameters

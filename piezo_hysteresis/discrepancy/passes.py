@@ -96,8 +96,12 @@ def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosi
     model = state.model
     if model is None:
         return state
-    state.progress("changes of the given model", 0.0)
-    found = same_stage(state.experiment, model, state.moving)
+    found = same_stage(
+        state.experiment,
+        model,
+        state.moving,
+        lambda part: state.progress("changes of the given model", 0.1 * part),
+    )
     if isinstance(found, Notice):
         state, found = replace(state, experiment=state.experiment.noting(found)), None
     return found or replace(state, model=without_corrections(model))
@@ -114,7 +118,12 @@ def answer_few_records(state: DiagnosisState) -> DiagnosisState | Diagnosis:
 def fit_baseline(state: DiagnosisState) -> DiagnosisState:
     """Estimates the floors, chooses the test records, and fits the published model to the others."""
     setup = prepare_baseline(
-        state.experiment.records, state.usable, state.model, state.selection, state.sharpens, state.progress
+        state.experiment.records,
+        state.usable,
+        state.model,
+        state.selection,
+        state.corrects_intersample_error,
+        state.progress,
     )
     return replace(state, setup=setup, where=_where(setup, state.progress), selection=None)
 
@@ -138,7 +147,7 @@ def search_again_with_sharper_samples(state: DiagnosisState) -> DiagnosisState:
     """Searches once more, if time is left and the model that was found corrects averaged samples differently."""
     selection = state.searched
     extends = selection.in_time and bool(selection.accepted)
-    if not (extends and state.sharpens and state.fitted.is_coarse(selection.model)):
+    if not (extends and state.corrects_intersample_error and state.fitted.is_coarse(selection.model)):
         return state
     again = search_effects(fit_baseline(state))
     return again if again.searched.in_time else state

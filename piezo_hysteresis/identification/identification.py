@@ -54,6 +54,12 @@ def correlated_pairs(fit: Fit, least: float) -> tuple[tuple[str, str, float], ..
     return tuple(pair for pair in pairs if abs(pair[2]) > least)
 
 
+def scale_note(model: Model) -> str:
+    """A sentence about the scales of the parameters without a unit."""
+    drive, stroke = model.voltage_scale, 1e6 * model.displacement_scale
+    return f"Parameters with the unit 1 belong to the scales v = u / {drive:.5g} V and x = y / {stroke:.5g} µm."
+
+
 @dataclass(frozen=True, slots=True)
 class PhaseError:
     """Free-run error of one record, without its mean.
@@ -183,8 +189,7 @@ class Identification:
         orders = f"na = {arx.array('a').size}, nb = {arx.array('b').size}, d = {arx['delay']:g}"
         lag = arx.group_delay * self.model.sample_period
         lines.append(f"G: {orders}, dc gain {arx.dc_gain:.5g} (fixed), lag {lag * 1e6:.4g} µs")
-        drive, stroke = self.model.voltage_scale, 1e6 * self.model.displacement_scale
-        lines.append(f"the parameters belong to the scales v = u / {drive:.5g} V and x = y / {stroke:.5g} µm")
+        lines.append(scale_note(self.model))
         for name, value in self.fit.values.items():
             if not name.startswith(f"{Arx.name}.") or name == f"{Arx.name}.delay":
                 lines.append(f"{name:28s} {value:12.4g} ± {1.96 * self.fit.standard_errors[name]:.2g} (95 %)")

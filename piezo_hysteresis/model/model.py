@@ -190,7 +190,8 @@ class Model(Composition):
     ) -> list[Array] | Array:
         """Free-run displacement [m] of every record, each at its own sample period; or of a voltage from rest.
 
-        A record starts at rest at its `settled_voltage`, unless it continues the one before it.
+        A record starts at rest at its `settled_voltage`, unless it continues the one before it. Between the two, the
+        last voltage is held. Over more than 0.1 s the dynamics settle, and only slow effects such as creep move on.
 
         Parameters
         ----------

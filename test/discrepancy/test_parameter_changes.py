@@ -132,7 +132,11 @@ def test_what_is_within_the_known_error_is_no_change(model):
 
 
 def test_diagnose_names_a_filter_and_its_model_predicts_better(model, another_day):
-    found = diagnose(played(replace(another_day, filter_pole=2e-3)), model)
+    parts = []
+    found = diagnose(
+        played(replace(another_day, filter_pole=2e-3)), model, progress=lambda message, part: parts.append(part)
+    )
+    assert parts == sorted(parts) and len({*parts}) > 5
     assert found.verdict is Verdict.NAMED
     (effect,) = found.effects()
     assert effect["family"] == "lag" and effect["parameters"]["tau"]["value"] == pytest.approx(2e-3, rel=0.05)

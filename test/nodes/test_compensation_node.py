@@ -15,6 +15,7 @@
 """The compensation node and a real driver: the stage goes where it was sent, or nothing moves."""
 
 import signal
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -214,6 +215,11 @@ def test_a_new_model_takes_effect_between_trajectories(lab):
     node.send(scan(0.3, 0.5), "second")
     second = values_of(node.until("second", "done"))
     assert float(second["rms"]) > 0.02 * STROKE, "the model of twice the gain was followed"
+    models.publish(String(data=dumps(replace(doubled, sample_period=2.0 * PERIOD))))
+    assert "identify at the rate of the driver" in node.until("model", "refused").message
+    node.send(scan(0.3, 0.5), "third")
+    third = values_of(node.until("third", "done"))
+    assert float(third["rms"]) == pytest.approx(float(second["rms"]), rel=0.1), "the refused model replaces none"
 
 
 def test_a_path_begins_in_the_loop_that_was_driven_before_the_model_came(lab):

@@ -31,10 +31,10 @@ from .signatures import SHAPES, ChangeablePrediction, predictions
 
 Array = NDArray[np.float64]
 
-DAY = {"gain": 0.0075, "loop": 0.04}
+DAY_TO_DAY = {"gain": 0.0075, "loop": 0.04}
 """Standard deviation of the relative changes of gain and loop height from one day to another."""
-PRICE = 0.5
-"""Cost, in units of V, of a gain or loop height that differs by one such standard deviation."""
+PENALTY = 0.5
+"""Added to V for a gain or loop height that has changed by one such standard deviation."""
 SHORTEST, LONGEST = 0.02, 100.0
 """Range of delays and time constants in the search [samples]."""
 SHOWN = 0.3
@@ -124,14 +124,14 @@ class ChangeSearch:
         target, matrix = self._weighted(self.measured - y, root), self._weighted(columns, root)
         scale = np.linalg.norm(matrix, axis=1)
         scale[scale <= CONSTANT * np.linalg.norm(root * columns, axis=1)] = np.inf
-        price = np.zeros(len(matrix))
+        penalty = np.zeros(len(matrix))
         for row, name in enumerate(names):
-            if name in DAY and name not in free:
-                price[row] = PRICE / DAY[name] ** 2
-        gram = (matrix / scale[:, None]) @ (matrix / scale[:, None]).T + np.diag(price / scale**2)
+            if name in DAY_TO_DAY and name not in free:
+                penalty[row] = PENALTY / DAY_TO_DAY[name] ** 2
+        gram = (matrix / scale[:, None]) @ (matrix / scale[:, None]).T + np.diag(penalty / scale**2)
         theta = np.linalg.lstsq(gram, (matrix / scale[:, None]) @ target, rcond=1e-12)[0] / scale
         left = target - theta @ matrix
-        return Account(key, float(left @ left + price @ theta**2), size, theta, names)
+        return Account(key, float(left @ left + penalty @ theta**2), size, theta, names)
 
     def session(self, account: Account) -> dict[str, float]:
         """Relative changes of gain and loop height in an account."""

@@ -21,7 +21,7 @@ small changes leave. Other changes that explain as much are its rivals.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,7 +60,11 @@ SURE = 2.5
 
 
 def find_change(
-    model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]
+    model: Model,
+    records: Sequence[Record],
+    used: Sequence[int],
+    floors: Sequence[float],
+    progress: Callable[[float], None] = lambda part: None,
 ) -> ParameterChange | None:
     """The change of one parameter that explains the residual of a given model.
 
@@ -74,6 +78,8 @@ def find_change(
         Indices of the records to explain.
     floors : sequence of float
         Floor of every record [m], including the known error of the model.
+    progress : callable
+        Called with the fraction done.
 
     Returns
     -------
@@ -85,7 +91,12 @@ def find_change(
     if day.cost <= ADEQUATE:
         return None
     keys = [k for k, kind in KINDS.items() if k in SHAPES or (kind.rows and kind.rows[0] in search.predicted[0].rows)]
-    accounts = [search.best(k) for k in (*search.sides, *keys) if k not in SECOND_ORDER]
+    first = [k for k in (*search.sides, *keys) if k not in SECOND_ORDER]
+    accounts = []
+    for done, key in enumerate(first):
+        progress(done / (len(first) + 1))
+        accounts.append(search.best(key))
+    progress(len(first) / (len(first) + 1))
     accounts += _filters_of_second_order(search)
     found = [_Explanation(search, a) for a in accounts]
     if "resonance" in keys and min(e.account.cost for e in found) > LEAVES:

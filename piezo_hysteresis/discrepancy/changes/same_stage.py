@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +28,7 @@ from ...model.model import Model
 from ...model.provenance import data_hash
 from ...record import Experiment, Notice, Record
 from ..diagnosis import Conclusion, Diagnosis
-from ..gap import measure_gap, stating
+from ..gap import measure_gap, with_stated_error
 from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
 from .change_kinds import LEAVES, ParameterChange
@@ -43,7 +43,9 @@ UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 """Units of time."""
 
 
-def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Diagnosis | Notice | None:
+def same_stage(
+    experiment: Experiment, model: Model, used: Sequence[int], progress: Callable[[float], None]
+) -> Diagnosis | Notice | None:
     """Name the parameter that has changed since `model` was identified.
 
     Parameters
@@ -54,6 +56,8 @@ def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Dia
         Model identified before the change, from other data.
     used : sequence of int
         Indices of the records to explain.
+    progress : callable
+        Called with the fraction done.
 
     Returns
     -------
@@ -74,7 +78,7 @@ def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Dia
                 f"differ from day to day, its error is within the known error of {1e9 * known:.3g} nm; a gap that is "
                 "found now existed then too",
             )
-        change = find_change(model, records, used, limits)
+        change = find_change(model, records, used, limits, progress)
         if change is None:
             return None
         changed = changed_model(model, change, records)
@@ -89,7 +93,7 @@ def same_stage(experiment: Experiment, model: Model, used: Sequence[int]) -> Dia
     return Diagnosis(
         conclusion=Conclusion.CHANGED_PARAMETER,
         reason=sentence_of(change),
-        model=stating(changed, gap.live, stroke(records)),
+        model=with_stated_error(changed, gap.live, stroke(records)),
         baseline=model,
         selection=None,
         fit=None,

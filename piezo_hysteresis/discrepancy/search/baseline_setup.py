@@ -115,7 +115,7 @@ def prepare_baseline(
     usable: Sequence[int],
     model: Model | None,
     known: Selection | None,
-    sharpens: bool,
+    corrects_intersample_error: bool,
     progress: Progress,
 ) -> BaselineSetup:
     """Floors, records to fit and to set aside, and the baseline.
@@ -130,7 +130,7 @@ def prepare_baseline(
         Start of the fit.
     known : Selection or None
         Result of an earlier search, whose model corrects averaged samples better than the baseline does.
-    sharpens : bool
+    corrects_intersample_error : bool
         Whether the inter-sample error is corrected.
     progress : callable
         Called with a message and the fraction done.
@@ -140,7 +140,7 @@ def prepare_baseline(
     ModelError
         If the records are faster than the model.
     """
-    progress("baseline", 0.0)
+    progress("baseline", 0.1)
     records = tuple(slowed(r) for r in given)
     test_records = reporting(records, usable)
     fitted = [i for i in usable if i not in test_records]
@@ -164,7 +164,7 @@ def prepare_baseline(
     progress("joint fit of the baseline", 0.2)
     baseline = joint(start, training_data, LAST, PRECISE)
     lost = [np.zeros(r.size) for r in records]
-    if sharpens:
+    if corrects_intersample_error:
         lost = intersample_error(known.model if known is not None else baseline.model, records)
     if any(c.any() for c in lost):
         records = less(records, lost)

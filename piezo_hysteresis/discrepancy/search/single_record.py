@@ -38,8 +38,8 @@ from ...model.provenance import provenance
 from ...record import CONDITIONING, Experiment, Notice, Record
 from ..diagnosis import Conclusion, Diagnosis
 from ..excitation_check import missing_excitation
-from ..gap import Gap, measure_gap, stating
-from ..next_experiment import decide
+from ..gap import Gap, measure_gap, with_stated_error
+from ..next_experiment import best_next_experiment
 from ..residual.localise import localise
 from ..residual.noise_floor import floors, noise_floors, stroke
 from ..residual.sampling import shortened
@@ -101,11 +101,11 @@ def diagnose_few(
     aside = reporting(records, used) if len(used) >= FEWEST_RECORDS else ()
     fitted = [i for i in used if i not in aside]
     known = _without(experiment, aside)
-    progress("baseline", 0.0)
-    published = model or identify(known, progress=lambda word, part: progress(word, 0.15 * part)).model
+    progress("baseline", 0.1)
+    published = model or identify(known, progress=lambda word, part: progress(word, 0.1 + 0.1 * part)).model
     found = None
     if model is None:
-        found = identify(known, memory=True, progress=lambda word, part: progress(word, 0.15 + 0.35 * part))
+        found = identify(known, memory=True, progress=lambda word, part: progress(word, 0.2 + 0.3 * part))
     start = model or (found.model if found else published)
     noise = noise_floors(records)
     least = floors(records, noise)
@@ -144,13 +144,13 @@ def diagnose_few(
     return Diagnosis(
         conclusion=conclusion,
         reason=reason,
-        model=stating(delivered, gap.live, stroke(records)),
-        baseline=stating(first, gap.before, stroke(records)),
+        model=with_stated_error(delivered, gap.live, stroke(records)),
+        baseline=with_stated_error(first, gap.before, stroke(records)),
         selection=selection,
         fit=final.fit,
         where=where,
         gap=gap,
-        next_experiment=decide(selection, training_data),
+        next_experiment=best_next_experiment(selection, training_data),
         experiment=experiment.noting(*missing),
     )
 

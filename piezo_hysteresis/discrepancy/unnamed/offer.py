@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ...effects import Creep, Offset, UnnamedCorrection, UnnamedPlays, UnnamedPositionMap, UnnamedRelaxation
 from ...identification.identified_range import identified_range
 from ...model.model import Model
-from ..gap import measure_gap, stating
+from ..gap import measure_gap, with_stated_error
 from ..search.baseline_setup import BaselineSetup
 from ..search.candidate_refits import LEAST_GAIN
 from ..search.refit import FAILURES, LAST, PRECISE, joint
@@ -147,7 +147,7 @@ def judged_on_test_records(correction: Correction, model: Model, setup: Baseline
         most = f"at most {100 * (WORSE - 1.0):.0f} % is allowed"
         refusal = f"it increases the error of a test record by {100 * (found.worst - 1.0):.0f} %, and {most}"
         return replace(found, refusal=refusal)
-    stated = stating(fit.stated_model, gap.live, setup.span)
+    stated = with_stated_error(fit.stated_model, gap.live, setup.span)
     envelope = identified_range(setup.records, setup.fitted)
     return replace(found, model=replace(stated, provenance={**stated.provenance, **envelope}))
 

@@ -99,9 +99,11 @@ class CompensationNode(GuardedNode):
 
     def _follow_model(self, model: Model) -> None:
         """Use this model from the next trajectory on. The present one ends with the model with which it was planned."""
+        if self._applied is not None:
+            check_period(model, self._applied.sample_period)
+            if self._job is None:
+                self._applied.follow(model)
         self._model = model
-        if self._job is None and self._applied is not None:
-            self._applied.follow(model)
 
     def _on_samples(self, message: bytes) -> None:
         driver = self._driver.limits

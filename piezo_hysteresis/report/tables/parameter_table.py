@@ -20,6 +20,7 @@ import numpy as np
 
 from ...effects import Arx
 from ...identification.fit.fit import Fit
+from ...identification.identification import scale_note
 from ...model.model import Model
 from .table import Table
 
@@ -56,11 +57,7 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
             interval = f"± {sure[name]:.2g}" if name in sure and name not in hit else ""
             message = f"{bounds}: at a bound" if name in hit else bounds
             rows.append((name, row.symbol, f"{value:.4g}", interval, row.unit, message, row.meaning))
-    drive, stroke = model.voltage_scale, 1e6 * model.displacement_scale
-    note = (
-        f"Parameters with the unit 1 belong to the scales v = u / {drive:.5g} V and x = y / {stroke:.5g} µm. "
-        "Do not compare them with those of a model that has other scales."
-    )
+    note = f"{scale_note(model)} Do not compare them with those of a model that has other scales."
     if Arx.name in model:
         note += (
             " Single ARX coefficients are not identifiable, because poles and zeros nearly cancel. "
