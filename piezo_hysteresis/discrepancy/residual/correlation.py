@@ -35,6 +35,12 @@ LONGEST_MEMORY, SHARE_OF_MEMORY = 40, 20
 """Highest order of the autoregression of the residual, and smallest number of samples per coefficient."""
 FEWEST_INDEPENDENT = 20.0
 """Effective number of samples below which the cross-correlation is not tested."""
+FEWEST_DIRECTIONS = 5.0
+"""Order of persistent excitation of the filtered drive below which a small cross-correlation proves nothing.
+
+A sum of m sines has order 2m. The filter that makes the residual white removes so few frequencies, and with them
+whatever follows the drive.
+"""
 PREDICTABLE = 1e-9
 """Share of the residual's power below which its innovations are rounding errors: the residual is a sum of few sines."""
 
@@ -42,7 +48,8 @@ CAPTION = (
     "The cross-correlation judges the model. If it exceeds its bounds, the residual depends on "
     "the drive, and something is missing in the model. If only the auto-correlation exceeds "
     "its bounds, the noise of the sensor may be coloured. For the cross-correlation, residual "
-    "and drive pass the filter that makes the residual white."
+    "and drive pass the filter that makes the residual white. Undecided means that this test says "
+    "nothing: the drive has too few frequencies, as a sine or a triangle, or the record is too short."
 )
 """Explanation of the test of whiteness."""
 
@@ -64,10 +71,12 @@ class Correlation:
     cross : (2k + 1,) ndarray
         Cross-correlation of e'(t + lag) with u'(t), both filtered by the autoregression that makes e white.
     cross_bound : float
-        99 % bound for an e that does not depend on u, from the effective number of samples; below 1 if `decides` is
-        True.
+        99 % bound for an e that does not depend on u, from the effective number of samples.
     effective_samples : float
         Number of independent samples that contain the same information as the n samples, n/Σ ρ_e' ρ_u'.
+    excitation_order : float
+        Effective order of persistent excitation of u', m²/Σ ρ_u'² over an m × m correlation matrix; infinite if e is
+        white without a filter, because then a drive of any frequencies would colour it.
     """
 
     lag: Array
@@ -77,11 +86,13 @@ class Correlation:
     cross: Array
     cross_bound: float
     effective_samples: float
+    excitation_order: float
 
     @property
     def decides(self) -> bool:
         """False if the drive contains too few frequencies, or the residual is too small, for any conclusion."""
-        return self.effective_samples >= FEWEST_INDEPENDENT
+        has_power = self.effective_samples >= FEWEST_INDEPENDENT and self.excitation_order >= FEWEST_DIRECTIONS
+        return has_power or not self.is_independent
 
     @property
     def is_white(self) -> bool:
@@ -137,10 +148,11 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
     k = np.arange(-lags, lags + 1)
     z = float(scipy.stats.norm.isf(FALSE_ALARMS / 2 / k.size))
     if auto_e[0] <= PREDICTABLE * power_e or auto_u[0] <= PREDICTABLE * power_u:
-        cross, effective = np.zeros(k.size), 0.0
+        cross, effective, order = np.zeros(k.size), 0.0, 0.0
     else:
         cross = both[k] / np.sqrt(power)
         effective = innovations.size / max(1.0, float(auto_e @ auto_u) / power)
+        order = _order(auto_u[: 2 * min(LONGEST_MEMORY, n // 4)] / auto_u[0]) if memory.size > 1 else np.inf
     return Correlation(
         lag=np.asarray(sample_period * np.arange(lags + 1)),
         auto=auto[: lags + 1] / power_e,
@@ -149,6 +161,7 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
         cross=cross,
         cross_bound=float(np.tanh(z / np.sqrt(effective - 3.0))) if effective >= FEWEST_INDEPENDENT else 1.0,
         effective_samples=effective,
+        excitation_order=order,
     )
 
 
@@ -175,6 +188,13 @@ def autoregression(auto: Array, size: int) -> Array:
         if criterion < least:
             best, least = np.concatenate(([1.0], -weights)), criterion
     return best
+
+
+def _order(auto: Array) -> float:
+    """Effective rank (tr R)²/tr R² of the correlation matrix R that has `auto` as its first row."""
+    often = 2.0 * (auto.size - np.arange(auto.size))
+    often[0] = auto.size
+    return float(auto.size**2 / (often @ auto**2))
 
 
 def _products(first: Array, second: Array) -> tuple[Array, Array, Array]:

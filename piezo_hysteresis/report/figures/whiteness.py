@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...discrepancy.residual.correlation import CAPTION, FEWEST_INDEPENDENT, correlate
+from ...discrepancy.residual.correlation import CAPTION, correlate
 from ...errors import RecordError
 from ..palette import BLACK, GREY
 from .comparison import ModelComparison
@@ -74,8 +74,7 @@ def whiteness(comparison: ModelComparison) -> Drawing | None:
     if found.is_independent and found.cross_bound > WIDE:
         free = f"may depend on the drive, but by less than the wide bound of {found.cross_bound:.2g}"
     if not found.decides:
-        few = f"the record has fewer than {FEWEST_INDEPENDENT:.0f} independent samples"
-        free = f"may or may not depend on the drive, because {few}"
+        free = "may or may not depend on the drive, because the record has too few frequencies or independent samples"
     return Drawing(
         "residual_tests",
         "Residual tests",

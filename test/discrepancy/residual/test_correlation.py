@@ -68,6 +68,26 @@ def test_one_frequency_does_not_decide():
     assert found.is_independent
 
 
+@pytest.mark.parametrize("levels", [(1.0,), (0.2, 0.4, 0.6, 0.8, 1.0)])
+def test_harmonics_of_a_sine_above_the_noise_are_not_passed(levels):
+    """The filter that makes the residual white removes what follows the drive, and a small correlation is left."""
+    phase = 2 * np.pi * np.arange(4000) / 400
+    drive = np.concatenate([level * np.sin(phase) for level in levels])
+    noise = np.random.default_rng(3).normal(size=drive.size)
+    memory = 60.0 * (drive**3 + np.roll(drive, 60) ** 2)  # 59 standard deviations of the noise and more
+    found = correlate(noise + memory, drive, 2e-3)
+    assert found.excitation_order == pytest.approx(2.0, abs=1.1)
+    assert not found.decides
+
+
+def test_a_white_residual_of_a_sine_passes():
+    """Whatever follows one sine would colour the residual."""
+    noise = np.random.default_rng(3).normal(size=4000)
+    found = correlate(noise, np.sin(2 * np.pi * np.arange(4000) / 400), 2e-3)
+    assert found.decides
+    assert found.is_independent
+
+
 @pytest.mark.parametrize(
     ("e", "u"), [(np.ones(50), np.arange(50.0)), (np.arange(50.0), np.ones(50)), (np.arange(9.0),) * 2]
 )
