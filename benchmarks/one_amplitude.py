@@ -18,7 +18,8 @@ Stages with all numbers drawn are recorded as the measured piezo of `benchmarks.
 first sample, then 35 cycles of one sine at 1 Hz, 200 samples a second. The zero wanders, and the sensor is noisy. Half
 of the stages are those of `benchmarks.nanopositioner`; the others have a Preisach density that plays do not reproduce.
 Growing, shrinking and climbing amplitudes, a faster and a slower rate are predicted, and compared without noise. The
-whole is repeated with every size of `identification.structure.prior` halved and doubled.
+whole is repeated with every size of `identification.structure.prior` halved and doubled, and with the true size of the
+wander of every stage, which no estimate from the record could improve.
 
     python -m benchmarks.one_amplitude --stages 8
 """
@@ -111,8 +112,12 @@ def percent(model: Model, record: Record, span: float) -> float:
     return float(100.0 * np.std(record.displacement - model.simulate(record)[0]) / span)
 
 
-def stages(count: int, first: int) -> list[tuple[Record, list[Record], list[Record]]]:
-    """For every stage the fitted record, those of other amplitudes, and those of other rates."""
+Played = tuple[Record, float, list[Record], list[Record]]
+"""Fitted record of a stage, its wander, and the records of other amplitudes and of other rates."""
+
+
+def stages(count: int, first: int) -> list[Played]:
+    """Some stages; `first` is the seed of the first one."""
     found = []
     for seed in range(first, first + count):
         rng = np.random.default_rng(seed)
@@ -120,20 +125,22 @@ def stages(count: int, first: int) -> list[tuple[Record, list[Record], list[Reco
         lag = {"pole": float(rng.uniform(2e-3, 14e-3)), "delay": float(rng.uniform(1e-3, 6e-3))}
         noise = float(np.exp(rng.uniform(np.log(2e-4), np.log(1e-3))))
         stage = kind.random(rng, mode=float(rng.uniform(300.0, 900.0)), noise=noise, **lag)
-        known = fitted(stage, float(rng.uniform(0.001, 0.004)), rng)
+        wander = float(rng.uniform(0.001, 0.004))
+        known = fitted(stage, wander, rng)
         quiet = replace(stage, noise=0.0)
         climbing = np.concatenate([waves(stage, (1.0,), 1.0, 1, 0.5 * level) for level in LEVELS])
         amplitudes = [waves(stage, LEVELS, 1.0, 2), waves(stage, LEVELS[::-1], 1.0, 2), climbing]
         rates = [waves(stage, (1.0,), f, max(2, round(4.0 * f))) for f in RATES]
-        found.append((known, *([quiet.play(u, PERIOD) for u in part] for part in (amplitudes, rates))))
+        found.append((known, wander, *([quiet.play(u, PERIOD) for u in part] for part in (amplitudes, rates))))
     return found
 
 
-def errors_of(played: list[tuple[Record, list[Record], list[Record]]]) -> Array:
+def errors_of(played: list[Played], *, true_wander: bool = False) -> Array:
     """Errors of every stage, other amplitudes and other rates: (n, 2) [%]."""
     found = []
-    for known, *others in played:
-        model = identify(Experiment((known,)), memory=True).model
+    for known, wander, *others in played:
+        with patch.object(prior, "WANDER", wander if true_wander else prior.WANDER):
+            model = identify(Experiment((known,)), memory=True).model
         span = float(np.ptp(known.displacement))
         found.append([float(np.mean([percent(model, r, span) for r in part])) for part in others])
     return np.array(found)
@@ -149,7 +156,8 @@ def run(options: argparse.Namespace) -> list[Figures]:
     """One row per size of the prior."""
     played = stages(options.stages, options.first)
     usual = errors_of(played)
-    rows: list[tuple[Cell, ...]] = [("as it is", *_row(usual, usual))]
+    true = errors_of(played, true_wander=True)
+    rows: list[tuple[Cell, ...]] = [("as it is", *_row(usual, usual)), ("WANDER as it was", *_row(true, usual))]
     failures = []
     for name in SIZES:
         for factor in (0.5, 2.0):

@@ -27,8 +27,9 @@ from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.steps.remaining_lag import lag
 from piezo_hysteresis.identification.structure.left_out import score_left_out
 from piezo_hysteresis.identification.structure.linear_part import fit_structure
-from piezo_hysteresis.identification.structure.piece_fit import best_step, fit_pieces
+from piezo_hysteresis.identification.structure.piece_fit import at_its_cost, best_step, fit_pieces, linearised
 from piezo_hysteresis.identification.structure.pieces import Kind, pieces_of
+from piezo_hysteresis.identification.structure.prior import WANDER, WANDER_TIME
 from piezo_hysteresis.record import Experiment, Record
 
 PERIOD = 5e-4
@@ -157,15 +158,33 @@ def test_drives_of_a_few_millihertz_need_no_mode(period):
     assert ExtraResonance.name not in model
 
 
-def test_one_rate_without_a_step_leaves_creep_in_the_model():
-    """A longer lag has the influence of creep at one rate, but predicts other rates badly."""
+@pytest.mark.parametrize("step", [False, True])
+def test_one_rate_leaves_creep_in_the_model(step):
+    """A longer lag or wider plays have the influence of creep at one rate, but predict other rates badly."""
     time = PERIOD * np.arange(4000)
     swing = np.concatenate([level * (1.0 - np.cos(2.0 * np.pi * time)) for level in (1.0, 2.0, 3.0, 4.0, 5.0)])
-    found = identify(Experiment((STAGE.play(swing, PERIOD, "sine_1hz"),)), memory=True)
+    fitted = growing_sine(1.0, PERIOD) if step else swing
+    found = identify(Experiment((STAGE.play(fitted, PERIOD, "sine_1hz"),)), memory=True)
     assert all(j.structure.creep_rates > 0 for j in found.structure.judged)
     assert {"creep", "creep_two_rates"} & {e.name for e in found.model.effects}
     faster = Experiment((STAGE.play(swing[::10], PERIOD, "sine_10hz"),))
     assert max(percents(found.model, faster)) < 0.65
+
+
+@pytest.mark.parametrize("smaller", [1.0, 1e-3, 1e-6])
+def test_the_wander_of_the_zero_is_fitted_for_strokes_of_any_length(identified, smaller):
+    """Zeros are lengths and the waves of a wander are not: in metres, their columns differ by many decades."""
+    (record,) = played(STAGE, (1.0,))
+    slow = np.sin(np.pi * np.arange(record.size) / (2.0 * record.size))
+    plain = identified.model.without("offset")
+    scale = plain.displacement_scale
+    record = replace(record, displacement=smaller * (plain.simulate(record)[0] + 0.005 * scale * slow))
+    model = replace(plain, displacement_scale=smaller * scale)
+    floor = smaller * STAGE.noise * STAGE.stroke
+    matrices, weights = linearised(model, pieces_of([record], (0,)), [floor], ())
+    fit = at_its_cost(model, (), matrices, weights)
+    span = WANDER * np.sqrt(2.0 * record.duration / WANDER_TIME) / (0.5 * np.pi)
+    assert fit.slow[1] * span == pytest.approx(0.005, rel=0.02)
 
 
 def test_a_rest_is_no_loop_that_could_be_left_out():

@@ -93,7 +93,9 @@ class PieceFit:
         """Fitted zeros of the runs [m], then the amplitudes of the waves of their wander, shape (s,)."""
         total, numbers = self.total, len(self.names)
         matrix, cross = total[numbers:-1, numbers:-1], total[numbers:-1, -1]
-        return np.asarray(np.linalg.lstsq(matrix, cross, rcond=None)[0])
+        # zeros are lengths and waves have no unit; without scales, lstsq drops the waves of short strokes
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
+        return np.asarray(scale * np.linalg.lstsq(matrix * np.outer(scale, scale), scale * cross, rcond=None)[0])
 
     @property
     def runs(self) -> int:

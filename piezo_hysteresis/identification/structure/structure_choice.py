@@ -153,13 +153,12 @@ def _leads(chosen: Judged, judged: Sequence[Judged]) -> dict[str, float]:
 
 
 def _offered(pieces: Sequence[RecordPiece]) -> list[ModelStructure]:
-    """The structures to choose from; without steps, a drive of one rate does not tell creep from a longer lag.
+    """The structures to choose from; a drive of one rate does not tell creep from a longer lag or a wider loop.
 
-    Every piezo ceramic creeps, and a lag in place of creep grows with the rate, which creep does not.
+    Every piezo ceramic creeps, and what takes the place of creep at one rate predicts others badly.
     """
-    one_rate = len({p.rate for p in pieces if p.kind is Kind.LOOP}) < 2
-    unknown = one_rate and not any(p.kind is Kind.STEP for p in pieces)
-    return [s for s in STRUCTURES if s.creep_rates > 0 or not unknown]
+    several_rates = len({p.rate for p in pieces if p.kind is Kind.LOOP}) > 1
+    return [s for s in STRUCTURES if s.creep_rates > 0 or several_rates]
 
 
 def _with_plays(start: Model, records: Sequence[Record]) -> Model:
