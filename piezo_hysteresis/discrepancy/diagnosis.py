@@ -121,8 +121,8 @@ class Diagnosis(Pictured):
 
     def effects(self) -> list[dict[str, Any]]:
         """The named effects, as in ``answer.json``."""
-        if self.change is not None:
-            return [self.change.row()]
+        if self.change is not None and self.gap is not None:
+            return [self.change.row(self.gap.explained)]
         if self.verdict is not Verdict.NAMED or self.selection is None or self.fit is None:
             return []
         rows = []

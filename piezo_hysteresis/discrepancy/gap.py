@@ -28,6 +28,7 @@ from ..model.model import Model
 from ..model.provenance import free_run
 from ..record import Record
 from .search.cross_validation import ADEQUATE
+from .search.selection_result import explained
 
 Array = NDArray[np.float64]
 
@@ -80,10 +81,19 @@ class Gap:
         Records with little noise, which show effects that the other records do not, then have the same weight. If there
         is no gap before, any improvement is sufficient.
         """
-        before, after = (
-            float(np.mean([(getattr(p, when) / p.floor) ** 2 for p in self.per_phase])) for when in ("before", "after")
-        )
+        before, after = self._squares
         return after < (FALLS if before > ADEQUATE else 1.0) * before
+
+    @property
+    def explained(self) -> float:
+        """Share X of the gap that the extended model explains: 1 − √((V_after − 1)/(V_before − 1)), between 0 and 1."""
+        return explained(*self._squares, 1.0)
+
+    @property
+    def _squares(self) -> tuple[float, float]:
+        """V before and after: mean over the records of the squared error, in floors."""
+        before, after = ([(getattr(p, when) / p.floor) ** 2 for p in self.per_phase] for when in ("before", "after"))
+        return float(np.mean(before)), float(np.mean(after))
 
 
 def with_stated_error(model: Model, percent: float, stroke: float) -> Model:

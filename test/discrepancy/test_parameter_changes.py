@@ -87,7 +87,7 @@ def test_the_changed_parameter_is_named(model, another_day, changed, key, size):
 def test_the_lag_of_a_moving_average_is_said(model, another_day, late):
     change = change_of(model, replace(another_day, filter_mean=late))
     assert change.kind.name == "second_order_low_pass" and change.kind.family == "lag"
-    lag = change.row()["parameters"]["lag"]
+    lag = change.row(1.0)["parameters"]["lag"]
     assert lag["value"] == pytest.approx(late, rel=0.06)
     assert lag["interval_95"][0] <= late <= lag["interval_95"][1]
     assert "It delays slow signals by" in sentence_of(change)
@@ -174,3 +174,13 @@ def test_a_good_model_is_not_changed(model):
     found = recalibrate(model, played(STAGE, (10.0,)))
     assert abs(found.gain) < 2e-3 and abs(found.lag) < 1e-5
     assert found.after <= found.before
+
+
+@pytest.mark.parametrize("changed", [{"gain": 1.02}, {"filter_pole": 2e-3}])
+def test_the_explained_share_is_that_of_the_gap(model, changed):
+    """Gain and loop height may differ from day to day, but what a changed gain explains is the whole gap."""
+    found = diagnose(played(replace(STAGE, noise_seed=1, **changed)), model)
+    gap, (effect,) = found.gap, found.effects()
+    left = (gap.after**2 - gap.floor**2) / (gap.before**2 - gap.floor**2)
+    assert effect["explained_fraction"] == pytest.approx(1.0 - np.sqrt(max(left, 0.0)), abs=0.02)
+    assert effect["explained_fraction"] > 0.8

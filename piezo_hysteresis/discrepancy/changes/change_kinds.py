@@ -128,7 +128,8 @@ class ParameterChange:
     rivals : tuple of str
         Keys of the changes that explain as much.
     before, after : float
-        V (mean R²) with fitted gain, loop height and zero, without and with the change.
+        V (mean R²) without and with the change. Gain and loop height are fitted in both, as far as they differ from
+        day to day, so V before is smaller than that of the gap.
     session : mapping of str to float
         Relative changes of ``gain`` and ``loop`` that were fitted together with it.
     """
@@ -181,15 +182,15 @@ class ParameterChange:
             rows["lag"] = {"value": lag[0], "interval_95": list(lag[1:]), "unit": "s"}
         return rows
 
-    def row(self) -> dict[str, Any]:
-        """The change as an effect of ``answer.json``."""
+    def row(self, explained: float) -> dict[str, Any]:
+        """The change as an effect of ``answer.json``; `explained` is its share of the gap."""
         kind = self.kind
         return {
             "name": kind.name,
             "law": kind.name,
             "family": kind.family,
             "member_certain": self.member_certain,
-            "explained_fraction": round(float(1.0 - np.sqrt(self.after / self.before)), 4),
+            "explained_fraction": round(explained, 4),
             "parameters": self.parameters,
             "confusable_with": list(self.others),
             "held_out_gain": round(float(np.log(self.before / max(self.after, 1e-12))), 4),

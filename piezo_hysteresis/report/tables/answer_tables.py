@@ -38,10 +38,8 @@ def effect_table(answer: Mapping[str, Any]) -> Table | None:
             rows.append((effect["name"], effect["family"], share, twins, parameter, f"{value['value']:.4g}", message))
     header = ("effect", "family", "share of the gap", "confusable with", "parameter", "value", "95 %")
     several = len({row[0] for row in rows}) > 1
-    note = (
-        "Each row states the share of the gap that this effect and all effects above it explain together."
-        if several
-        else ""
+    note = "The share is the decrease of the RMS error above the noise floor." + (
+        " Each row states the share that this effect and all effects above it explain together." if several else ""
     )
     return Table("Effects found", header, tuple(rows), note, frozenset({2, 5, 6})) if rows else None
 
