@@ -31,6 +31,7 @@ from ...compensation import Limits, Plan, plan
 from ...errors import ModelError, RecordingError
 from ...model import model_file
 from ...recording.formats.wanted_path import read_path
+from ...recording.whole_file import whole_file
 from ...report.json_file import write_json
 from ...report.tables.plan_table import answer, notes, plan_table
 from ..options.destination import add_results, require_new_results
@@ -125,6 +126,10 @@ def run(args: argparse.Namespace) -> int:
     out = console()
     if resampled:
         out.print(f"note: the path was interpolated to the model's sample period, {model.sample_period:g} s")
+    if period is None and wanted.size > 1:
+        out.print(
+            f"note: the path has no times; its rows are taken at the model's sample period, {model.sample_period:g} s"
+        )
     for line in notes(found):
         out.print(line)
     if not found.reachability.is_whole and not args.allow_partial:
@@ -143,11 +148,9 @@ def _save(found: Plan, place: Path) -> None:
         "wanted_displacement": found.wanted,
         "path_begin": np.int64(found.begin),
     }
-    draft = place.with_name(place.name + ".tmp")
     try:
-        with draft.open("wb") as file:
+        with whole_file(place) as draft, draft.open("wb") as file:
             np.savez(file, **arrays)
-        draft.replace(place)
     except OSError as error:
         raise RecordingError(f"{place}: cannot be written ({error.strerror or error})") from None
 

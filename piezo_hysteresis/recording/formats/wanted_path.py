@@ -17,12 +17,15 @@
 from __future__ import annotations
 
 import csv
+import zipfile
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import RecordingError
+from ..table.column_inference import inferred_columns, unit_in
+from ..table.dialect import decoded
 from ..table.table import named_column
 from ..table.units import si_factor
 
@@ -44,7 +47,7 @@ def read_path(path: str | Path) -> tuple[Array, float | None]:
     Raises
     ------
     RecordingError
-        If there is no such file, no displacement in it, or times that are not even.
+        If there is no such file, no displacement in it, several columns without times, or times that are not even.
     """
     place = Path(path).expanduser()
     try:
@@ -57,20 +60,22 @@ def read_path(path: str | Path) -> tuple[Array, float | None]:
 
 def _from_npz(place: Path) -> tuple[Array, float | None]:
     try:
-        with np.load(place, allow_pickle=False) as held:
+        with place.open("rb") as file, np.load(file, allow_pickle=False) as held:
             if "displacement" not in held:
                 raise RecordingError(f"{place}: got {', '.join(held) or 'nothing'}, expected a key 'displacement' [m]")
             period = float(held["sample_period"]) if "sample_period" in held else None
+            if period is not None and not 0.0 < period < np.inf:
+                raise RecordingError(f"{place}: got a sample_period of {period:g} s, expected a positive time")
             return _checked(place, np.asarray(held["displacement"], dtype=np.float64)), period
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise RecordingError(f"{place}: no NPZ file that can be read ({error}), expected numbers") from None
 
 
 def _from_csv(place: Path) -> tuple[Array, float | None]:
     try:
-        with place.open(newline="", encoding="utf-8") as file:
-            rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
-    except (UnicodeError, csv.Error) as error:
+        lines = decoded(place.read_bytes()).splitlines()
+        rows = [row for row in csv.reader(lines) if row and not row[0].startswith("#")]
+    except csv.Error as error:
         raise RecordingError(f"{place}: no CSV that can be read ({error})") from None
     titles = [named_column(title) for title in rows[0]] if rows else []
     at = {channel: k for k, (channel, _) in enumerate(titles)}
@@ -79,6 +84,15 @@ def _from_csv(place: Path) -> tuple[Array, float | None]:
             f"{place}: got the columns {', '.join(rows[0]) if rows else 'none'}, "
             "expected a header with a displacement and its unit, e.g. time_s,displacement_um"
         )
+    if "time" not in at and len(titles) > 1:  # rows without times are taken at the model's rate, often far too fast
+        found = inferred_columns(rows[0], (at["displacement"],), ("time",))
+        if "time" not in found:
+            raise RecordingError(
+                f"{place}: got the columns {', '.join(rows[0])}, expected one for the time, e.g. time_s; name it, or "
+                "give the displacement alone for rows at the model's sample period"
+            )
+        at["time"] = found["time"]
+        titles[at["time"]] = ("time", unit_in(rows[0][at["time"]], "time"))
 
     def column(channel: str) -> Array:
         k = at[channel]

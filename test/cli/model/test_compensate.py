@@ -123,6 +123,49 @@ def test_a_file_without_a_path_is_bad_input(piezo, model, tmp_path, text, reason
     assert done.status == 2 and reason in done.err
 
 
+@pytest.mark.parametrize(
+    ("header", "encoding"),
+    [
+        ("time_s,displacement_um", "utf-8-sig"),
+        ("t_s,displacement_um", "utf-8"),
+        ("Zeit [s],displacement_µm", "latin-1"),
+    ],
+)
+def test_times_under_other_titles_and_encodings_count(piezo, model, tmp_path, header, encoding):
+    """A path whose times are not found would be played at the rate of the model, here fifty times too fast."""
+    rows = "".join(f"{0.001 * k:g},{2.0 + np.sin(0.1 * k):.6f}\n" for k in range(100))
+    (tmp_path / "path.csv").write_text(f"{header}\n{rows}", encoding=encoding)
+    done = piezo("compensate", model, tmp_path / "path.csv", "-o", tmp_path / "command.npz")
+    assert done.status == 0, done.err
+    with np.load(tmp_path / "command.npz") as held:
+        assert held["wanted_displacement"].size == 1 + round(0.099 / PERIOD)
+
+
+def test_rows_without_times_are_at_the_rate_of_the_model_which_is_said(piezo, model, tmp_path):
+    rows = "\n".join(f"{2.0 + 0.001 * k:g}" for k in range(100))
+    (tmp_path / "path.csv").write_text(f"displacement_um\n{rows}\n")
+    done = piezo("compensate", model, tmp_path / "path.csv", "-o", tmp_path / "command.npz")
+    assert done.status == 0 and "the path has no times" in done.out, done.err
+    (tmp_path / "path.csv").write_text("sample,displacement_um\n0,1\n1,1\n")
+    done = piezo("compensate", model, tmp_path / "path.csv", "-o", tmp_path / "other.npz")
+    assert done.status == 2 and "expected one for the time" in done.err and done.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("cut", [0, 100])
+def test_a_damaged_npz_is_bad_input(piezo, model, tmp_path, cut):
+    np.savez(tmp_path / "whole.npz", displacement=np.ones(100))
+    (tmp_path / "path.npz").write_bytes((tmp_path / "whole.npz").read_bytes()[:cut])
+    done = piezo("compensate", model, tmp_path / "path.npz", "-o", tmp_path / "command.npz")
+    assert done.status == 2 and "path.npz" in done.err and done.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("period", [np.nan, 0.0, -1e-3])
+def test_an_impossible_sample_period_is_bad_input(piezo, model, tmp_path, period):
+    np.savez(tmp_path / "path.npz", displacement=np.full(100, 1e-6), sample_period=period)
+    done = piezo("compensate", model, tmp_path / "path.npz", "-o", tmp_path / "command.npz")
+    assert done.status == 2 and "expected a positive time" in done.err
+
+
 def test_an_effect_without_an_inverse_is_refused_by_name(piezo, tmp_path):
     softened = replace(MODEL, effects=(*MODEL.effects, SofteningOfOneMode(k3=0.05)))
     path = model_file.save(softened, tmp_path / "softened.yaml")
