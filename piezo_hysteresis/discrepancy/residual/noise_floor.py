@@ -52,7 +52,12 @@ def stroke(records: Sequence[Record]) -> float:
 
 
 def white_noise(record: Record) -> float:
-    """RMS of the white noise of a record [m], from the median of its spectrum near the Nyquist frequency."""
+    """RMS of the white noise of a record [m], from the median of its spectrum near the Nyquist frequency.
+
+    0 for fewer than three samples, which do not show it.
+    """
+    if record.size < 3:
+        return 0.0
     if record.size < 32:
         return float(np.std(np.diff(record.displacement)) / np.sqrt(2.0))
     second = np.diff(record.displacement, 2)

@@ -52,7 +52,7 @@ def record_table(experiment: Experiment, noise: np.ndarray) -> Table:
                 duration(record.duration),
                 f"{record.voltage.min():.3g} … {record.voltage.max():.3g}",
                 f"{1e6 * record.displacement.min():.4g} … {1e6 * record.displacement.max():.4g}",
-                f"{1e9 * sigma:.2g}",
+                f"{1e9 * sigma:.2g}" if record.size > 2 else "",  # two samples do not show it
                 _lag(record),
                 "truncated" if record.truncated else start,
             )

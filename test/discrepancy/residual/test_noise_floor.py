@@ -104,6 +104,14 @@ def test_quantisation_is_noise_of_one_step_over_root_twelve():
     assert quantum(sine(100.0, 2e-5, 0.4)) == 0.0
 
 
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_a_record_too_short_for_a_spectrum_has_a_finite_floor(size):
+    """A floor that is not a number ended the fits of a whole experiment."""
+    short = Record(np.zeros(size), 1e-8 * np.arange(size), 2e-5)
+    found = noise_floors([sine(100.0, 2e-5, 0.2), short])
+    assert np.isfinite(found).all() and found[1] >= 0.0
+
+
 def test_no_floor_lies_below_the_adequacy_floor():
     records = (sine(100.0, 2e-5, 0.2, sigma=1e-12),)
     assert floors(records)[0] == ADEQUACY * stroke(records)
