@@ -19,6 +19,7 @@ Exit status: 0 done (also for every verdict of ``piezo diagnose``), 1 not conver
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from importlib import import_module
@@ -71,6 +72,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         Arguments without the program name; default those of the process.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # units and symbols must not end a command on another encoding
     chosen = next((a for a in arguments if not a.startswith("-")), None)
     try:
         args = _parser(chosen).parse_args(arguments)

@@ -83,7 +83,7 @@ def find_recordings(
 
 def _named_by(url: str, storage: Storage, names: NamePattern) -> Iterator[Source]:
     fs, path = storage.open(url)
-    if _MAGIC.search(path):
+    if _MAGIC.search(path) and not fs.exists(path):  # a file may be called run[1].csv
         matches = fs.glob(path, detail=True)
     else:
         info = fs.info(path)

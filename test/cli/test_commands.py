@@ -120,6 +120,17 @@ def test_report_writes_a_page_with_its_figures(piezo, identified, folder, tmp_pa
     assert (tmp_path / "page_figures" / "loops_by_amplitude.svg").exists()
 
 
+def test_report_refuses_two_models_of_one_name(piezo, identified, folder, tmp_path):
+    """The page would compare one model only, and name it twice."""
+    for place in ("old", "new"):
+        (tmp_path / place).mkdir()
+        shutil.copy(f"{identified}/model.yaml", tmp_path / place / "model.yaml")
+    words = (word for place in ("old", "new") for word in ("--model", tmp_path / place / "model.yaml"))
+    done = piezo("report", folder, *words, "-o", tmp_path / "page.html")
+    assert done.status == 2 and "two models called 'model', expected LABEL=FILE" in done.err
+    assert not (tmp_path / "page.html").exists()
+
+
 def test_import_maps_columns_units_and_period_of_a_foreign_file(piezo, tmp_path):
     t = 0.01 * np.arange(400)
     u = 2.0 - 2.0 * np.cos(2 * np.pi * t)

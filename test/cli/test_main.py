@@ -66,6 +66,13 @@ def test_an_interrupt_while_a_command_loads_is_reported_in_one_line():
     assert loading.returncode == INTERRUPTED
 
 
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_a_terminal_without_greek_letters_does_not_end_a_command(encoding):
+    command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "effects", "creep"]
+    done = subprocess.run(command, capture_output=True, check=False, env={**os.environ, "PYTHONIOENCODING": encoding})
+    assert (done.returncode, done.stderr) == (0, b"") and b"1/decade" in done.stdout
+
+
 def test_a_closed_output_pipe_is_not_an_error():
     done = subprocess.run(
         f"{sys.executable} -m piezo_hysteresis.cli.main effects | head -1",

@@ -61,6 +61,11 @@ def test_patterns(lab):
     assert (named.stage, named.month) == ("b", "2026-11")
 
 
+def test_a_file_whose_name_looks_like_a_pattern_is_found(lab):
+    (lab / "run[1].csv").write_text("rows")
+    assert [s.url for s in find_recordings([f"{lab}/run[1].csv"])] == [f"{lab}/run[1].csv"]
+
+
 def test_the_version_changes_with_the_file(lab):
     place = lab / "stage_a" / "2026-11-03"
     (before,) = find_recordings([str(place)])

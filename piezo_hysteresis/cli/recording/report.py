@@ -20,6 +20,7 @@ import argparse
 from pathlib import Path
 
 from ...discrepancy.residual.residual import zero_per_phase
+from ...errors import ParameterError
 from ...model import model_file
 from ...report.figures.comparison import compare
 from ...report.json_file import read_json
@@ -64,7 +65,10 @@ def run(args: argparse.Namespace) -> int:
     models = {}
     for text in args.model:
         label, equals, path = text.rpartition("=")
-        models[label if equals else Path(path).stem] = model_file.load(path)
+        label = label if equals else Path(path).stem
+        if label in models:
+            raise ParameterError(f"--model: got two models called '{label}', expected LABEL=FILE with different labels")
+        models[label] = model_file.load(path)
     answer = None if args.answer is None else read_json(args.answer)
     experiment = reading_options.read(args)
     nuisances = None if args.one_zero else {label: zero_per_phase(model) for label, model in models.items()}
