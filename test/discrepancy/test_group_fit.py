@@ -119,11 +119,15 @@ def test_intervals_have_the_stated_coverage():
     true = np.zeros(5)
     true[GROUPS.index("gain")] = 0.004
     changed, errors = run(changed_by(MODEL, true)), []
-    for seed in range(6):
-        found, _ = fit(changed, seed=seed)
+    watch, predictor, recent = stream(changed)
+    newest = changed[-recent.copy().size :]
+    for seed in range(8):
+        measured = newest + NOISE * np.random.default_rng(seed).standard_normal(newest.size)
+        minute = Minute(predictor.drive, measured, predictor.offset)
+        found = fit_groups(MODEL, minute, watch.baseline, "gain", INTERVAL)
         errors.append((found.change[0] - 0.004) / found.deviation[0])
-    assert np.count_nonzero(np.abs(errors) < 1.96) >= 4
-    assert 0.3 < np.sqrt(np.mean(np.square(errors))) < 2.0
+    assert np.count_nonzero(np.abs(errors) < 1.96) >= 6
+    assert 0.3 < np.sqrt(np.mean(np.square(errors))) < 1.7
 
 
 def test_another_shape_needs_a_full_identification():

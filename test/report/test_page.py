@@ -21,6 +21,7 @@ import re
 import shutil
 import subprocess
 from base64 import b64decode
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
@@ -135,6 +136,8 @@ def test_saves_every_figure_with_its_data_the_same_as_in_the_page(drawn, saved):
     for drawing, text in zip(drawn.drawings, inside, strict=True):
         file = saved.with_name("page_figures") / f"{drawing.name}.svg"
         assert b64decode(text).decode() == file.read_text(encoding="utf-8")
+    smallest = min(drawn.drawings, key=lambda d: len(d.svg()))
+    assert replace(smallest).svg() == smallest.svg(), "drawn again, it is the same"
 
 
 def test_a_place_that_cannot_be_written_is_reported(drawn, saved):

@@ -21,6 +21,7 @@ import io
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ from ...errors import RecordingError
 from .style import SETTINGS
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class Drawing:
     """One figure of a report.
 
@@ -70,6 +71,11 @@ class Drawing:
 
     def svg(self) -> str:
         """The figure as SVG text, identical for identical data."""
+        return self._svg
+
+    @cached_property
+    def _svg(self) -> str:
+        """Drawn once for the page and for the file beside it."""
         stream = io.StringIO()
         with mpl.rc_context({**SETTINGS, "svg.hashsalt": self.name}):
             self.figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
