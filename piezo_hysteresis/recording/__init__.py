@@ -34,6 +34,7 @@
 ``step_before``       the displacement jumps with the first sample: a step from rest was not recorded
 ``rows_before``       rows before the chosen ones were read to determine the initial state
 ``proposed``          names of phases that were proposed from the shape of the drive
+``left_out``          a phase with fewer samples than are averaged into one
 ``averaged``          a recording too long for the memory, averaged on reading
 ``columns`` ``held``  the assignment of channels in a file of other software
 ``time_base``         times that are uneven, overlap, or are those of reception

@@ -34,6 +34,9 @@ VOLTAGE_RANGE = (1e-3, 1.2e3)
 
 GAIN_RANGE = (1e-10, 3e-4)
 """Range of displacement per volt that a piezo stage can have, with or without an amplifier [m/V]."""
+USUAL_STROKE, USUAL_VOLTAGE, USUAL_GAIN = 20e-6, 30.0, 2e-7
+"""Stroke [m], largest voltage [V] and displacement per volt [m/V] of a usual stage. The factor that a unit is off by is
+found for strokes of 0.6 to 600 µm, voltages of 1 V to 1 kV, and 6 nm/V to 6 µm/V."""
 FAINT = (4e-8, 1e-12)
 """A displacement per volt below the first value [m/V] with noise below the second [m] suggests a wrong unit."""
 
@@ -83,14 +86,14 @@ def _units(experiment: Experiment, spans: Samples) -> list[Notice]:
     if u_span == 0.0:
         notices.append(Notice("constant", "the voltage never changes; check that the stage was driven", severe=True))
     elif not VOLTAGE_RANGE[0] <= u_peak <= VOLTAGE_RANGE[1]:
-        text = f"largest voltage {u_peak:.3g} V, expected 1 mV to 1.2 kV{_likely(u_peak, VOLTAGE_RANGE)}"
+        text = f"largest voltage {u_peak:.3g} V, expected 1 mV to 1.2 kV{_likely(u_peak, USUAL_VOLTAGE)}"
         notices.append(Notice("units", text, severe=True))
     if y_span == 0.0:
         notices.append(
             Notice("constant", "the displacement never changes; check the sensor and the column", severe=True)
         )
     elif not DISPLACEMENT_RANGE[0] <= y_span <= DISPLACEMENT_RANGE[1]:
-        text = f"range of displacement {y_span:.3g} m, expected 1 nm to 2 mm{_likely(y_span, DISPLACEMENT_RANGE)}"
+        text = f"range of displacement {y_span:.3g} m, expected 1 nm to 2 mm{_likely(y_span, USUAL_STROKE)}"
         notices.append(Notice("units", text, severe=True))
     return notices or _gain(experiment, y_span / u_span)
 
@@ -98,7 +101,7 @@ def _units(experiment: Experiment, spans: Samples) -> list[Notice]:
 def _gain(experiment: Experiment, gain: float) -> list[Notice]:
     """Notice about the displacement per volt, where each channel alone looks normal."""
     if not GAIN_RANGE[0] <= gain <= GAIN_RANGE[1]:
-        text = f"displacement per volt {gain:.2g} m/V, expected 0.1 nm/V to 300 µm/V{_likely(gain, GAIN_RANGE)}"
+        text = f"displacement per volt {gain:.2g} m/V, expected 0.1 nm/V to 300 µm/V{_likely(gain, USUAL_GAIN)}"
         return [Notice("units", text)]
     parts = [r.displacement[_excerpt(r)] for r in experiment if r.size > 8]
     noise = min((float(np.median(np.abs(np.diff(y, 3)))) / 3.0 for y in parts), default=0.0)
@@ -111,10 +114,9 @@ def _gain(experiment: Experiment, gain: float) -> list[Notice]:
     return []
 
 
-def _likely(value: float, bounds: tuple[float, float]) -> str:
-    """The power of a thousand that brings a value well inside its bounds."""
-    middle = float(np.sqrt(bounds[0] * bounds[1]))
-    power = 3 * round(float(np.log10(middle / value)) / 3)
+def _likely(value: float, usual: float) -> str:
+    """The power of a thousand that brings a value nearest to the usual one."""
+    power = 3 * round(float(np.log10(usual / value)) / 3)
     return f"; a unit may be off by 1e{power:+d}" if power else ""
 
 

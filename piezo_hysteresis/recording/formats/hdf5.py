@@ -73,11 +73,14 @@ class Hdf5Arrays(NamedArrays):
             ) from None
         self._file = h5py.File(path, "r")
         self._rows_last = self._file.userblock_size > 0  # MATLAB stores the transpose after its own header
-        self._names: list[str] = []
+        self._paths: dict[str, str] = {}  # a name in the file may have dots of its own
+
+        def note(path: str, item: object) -> None:
+            if isinstance(item, h5py.Dataset) and not path.startswith("#"):
+                self._paths.setdefault(path.replace("/", "."), path)
+
         try:
-            self._file.visititems(
-                lambda name, item: self._names.append(name) if isinstance(item, h5py.Dataset) else None
-            )
+            self._file.visititems(note)
         except BaseException:
             self._file.close()
             raise
@@ -86,11 +89,11 @@ class Hdf5Arrays(NamedArrays):
         self._file.close()
 
     def __iter__(self) -> Iterator[str]:
-        return (name.replace("/", ".") for name in self._names if not name.startswith("#"))
+        return iter(self._paths)
 
     def title(self, name: str) -> str:
         """Name of an array, with its unit in parentheses where an attribute states one."""
-        attributes = self._file[name.replace(".", "/")].attrs
+        attributes = self._file[self._paths[name]].attrs
         for key in _UNITS:
             if key not in attributes:
                 continue
@@ -126,9 +129,7 @@ class Hdf5Arrays(NamedArrays):
 
     def _numbers(self, name: str) -> Any:
         """The dataset of a name, its size checked."""
-        if name not in set(self):
-            raise KeyError(name)
-        dataset = self._file[name.replace(".", "/")]
+        dataset = self._file[self._paths[name]]
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # a type that numpy cannot represent is not supported
             kind = dataset.dtype

@@ -31,7 +31,14 @@ from ..checks.error_context import naming
 from ..checks.split_at_gaps import split_at_gaps
 from ..segmentation.decimating_buffer import averaged_notice, shared_averages
 from ..segmentation.phases import labelled
-from ..table.column_inference import inference_notice, inferred_columns, inferred_period, unit_in
+from ..table.column_inference import (
+    inference_notice,
+    inferred_columns,
+    inferred_period,
+    period_of,
+    require_different,
+    unit_in,
+)
 from ..table.read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from ..table.time_column import TimeColumn
 from ..whole_file import whole_file
@@ -72,6 +79,8 @@ class Npz:
                 sizes.append(_size(file, options))
         for file, size, average in zip(files, sizes, shared_averages(sizes, options.average), strict=True):
             if size < average:
+                message = f"{file.name} has {size} samples, fewer than the {average} that make one; it was left out"
+                notices.append(Notice("left_out", message))
                 continue
             with naming(file, _EXPECTED):
                 parts, more_notices = _phase(file, options, average, end)
@@ -79,7 +88,9 @@ class Npz:
             notices += more_notices
             end = parts[-1].start_time + parts[-1].duration
         if not records:
-            raise RecordingError(f"{path}: `average`: got {options.average}, expected fewer samples than a phase has")
+            if max(sizes) == 0:
+                raise RecordingError(f"{path}: got no sample, expected at least one")
+            raise RecordingError(f"{path}: `average`: got {options.average}, expected at most {max(sizes)} samples")
         return Experiment(tuple(records), str(path), tuple(notices))
 
     def write(self, experiment: Experiment, path: Path) -> None:
@@ -105,12 +116,23 @@ class Npz:
 def _places(values: NpzMembers, options: ReadOptions) -> tuple[dict[str, str], dict[str, str]]:
     """Key of every channel and label, and the channels whose keys were inferred."""
     place = {name: str(options.columns.get(name, name)) for name in (*CHANNELS, *options.columns, *LABELS)}
-    open_ = [c for c in ("voltage", "displacement") if c not in options.columns and c not in values]
+    timed = options.sample_period is not None or "sample_period" in values or "sample_period" in options.columns
+    wanted = ("voltage", "displacement") if timed or _period(values) else ("time", "voltage", "displacement")
+    open_ = [c for c in wanted if c not in options.columns and c not in values]
     names = [name for name in values if name not in place.values()]
     inferred = {c: names[at] for c, at in inferred_columns(names, (), open_).items()}
     place |= inferred
+    require_different({c: place[c] for c in (*CHANNELS, *options.columns) if is_channel(c)})
     others = {name: name for name in values if is_channel(name) and name not in (*place, *place.values())}
     return others | place, inferred
+
+
+def _period(values: NpzMembers) -> float | None:
+    """Sample period [s] of the first key that is called like one and holds one number."""
+    for name in values:
+        if (found := inferred_period([name])) and values.size(name) == 1:
+            return period_of(name, values.number(name), found[1])
+    return None
 
 
 def _size(file: Path, options: ReadOptions) -> int:
@@ -169,12 +191,11 @@ def _time_base(
     if place["sample_period"] in values or "sample_period" in options.columns:
         period = options.in_si("sample_period", np.array(values.number(place["sample_period"])))
         return float(period) * average, {}, []
-    if place["time"] in values:
+    if place["time"] in values or "time" in options.columns:
         base = TimeColumn.of(times())
         return base.period, dict(zip(base.breaks.tolist(), base.lost.tolist(), strict=True)), base.notices()
-    if found := inferred_period(values):
-        value = values.number(found[0])
-        return (1.0 / value if found[1] else value) * average, {}, []
+    if (found := _period(values)) is not None:
+        return found * average, {}, []
     return values.number(place["sample_period"]), {}, []  # raises the error that lists the keys
 
 

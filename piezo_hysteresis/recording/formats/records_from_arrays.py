@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from numpy.typing import NDArray
@@ -25,7 +25,14 @@ from numpy.typing import NDArray
 from ...errors import RecordingError
 from ...record import Notice, Record
 from ..segmentation.decimating_buffer import DecimatingBuffer, averaged_notice
-from ..table.column_inference import inference_notice, inferred_columns, inferred_period, unit_in
+from ..table.column_inference import (
+    inference_notice,
+    inferred_columns,
+    inferred_period,
+    period_of,
+    require_different,
+    unit_in,
+)
 from ..table.read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from ..table.table import table_records
 from .named_arrays import NamedArrays
@@ -62,9 +69,8 @@ def records_from_arrays(
     given = {c: str(options.columns.get(c, prefix + c)) for c in (*CHANNELS, *others, *LABELS)}
     places = {c: place for c, place in given.items() if c in options.columns or place in arrays}
     labels = {name: _label(arrays[places[name]], places[name]) for name in LABELS if name in places}
-    if options.sample_period is None and "sample_period" not in places and (found := inferred_period(arrays)):
-        value = float(_label(arrays[found[0]], found[0]))
-        labels["sample_period"] = repr(1.0 / value if found[1] else value)
+    if options.sample_period is None and "sample_period" not in places and (found := _period(arrays, places)):
+        labels["sample_period"] = repr(found)
     timed = options.sample_period is not None or "sample_period" in labels
     names = [name for name in arrays if name not in places.values()]
     wanted = [c for c in ("time", "voltage", "displacement") if c not in places and not (c == "time" and timed)]
@@ -74,6 +80,7 @@ def records_from_arrays(
     for channel in ("voltage", "displacement"):
         if channel not in places:
             raise RecordingError(f"got {_listed(arrays)}, expected {given[channel]}; name it by `columns`")
+    require_different({c: place for c, place in places.items() if is_channel(c)})
     units = {c: unit_in(arrays.title(p) if p in arrays else p, c) for c, p in places.items() if is_channel(c)}
     buffers = {c: _channel(arrays, places[c], options) for c in units}
     columns = {c: options.in_si(c, buffer.column(0), units[c]) for c, buffer in buffers.items()}
@@ -88,6 +95,14 @@ def records_from_arrays(
     if options.average is None and average > 1:
         notices.append(averaged_notice(average, records[0].sample_period, labels.get("phase", "")))
     return records, [*notices, *inference_notice({c: titles[at] for c, at in found_at.items()}, units)]
+
+
+def _period(arrays: NamedArrays, places: Mapping[str, str]) -> float | None:
+    """Sample period [s] of the first variable that is called like one and holds one number."""
+    for name in arrays:
+        if name not in places.values() and (found := inferred_period([name])) and arrays[name].size == 1:
+            return period_of(name, float(_label(arrays[name], name)), found[1])
+    return None
 
 
 def _channel(arrays: NamedArrays, place: str, options: ReadOptions) -> DecimatingBuffer:

@@ -32,6 +32,13 @@ _BRACKETS = str.maketrans("[]", "()")
 """Replacement for brackets, which denote the column of a matrix."""
 
 
+def _numbers(values: NDArray[Any], channel: Any) -> NDArray[Any]:
+    """Numbers of a part of a channel: of dates, the time since its first one [s]."""
+    if values.dtype.kind != "M":
+        return np.asarray(values)
+    return np.asarray((values - channel[0]) / np.timedelta64(1, "s"))
+
+
 class TdmsArrays(NamedArrays):
     """``"group.channel (unit)"`` to array, and ``"dt"``, the increment of the waveforms [s].
 
@@ -91,4 +98,4 @@ class TdmsArrays(NamedArrays):
     def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
         channel = self._channels[name]
         self.check_column(name, (len(channel),), column)
-        return self.in_pieces(name, len(channel), options, lambda part: np.asarray(channel[part]))
+        return self.in_pieces(name, len(channel), options, lambda part: _numbers(channel[part], channel))

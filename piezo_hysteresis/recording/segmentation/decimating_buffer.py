@@ -189,8 +189,10 @@ class DecimatingBuffer:
         Raises
         ------
         RecordingError
-            If the selected part holds no sample.
+            If the selected part holds no sample, or fewer than are averaged into one.
         """
+        if not self._columns[at] and self.factor > 1:
+            raise RecordingError(f"`average`: got {self.factor}, expected at most {len(self._rest)} samples")
         if not self._columns[at] and (self.start or self.stop is not None):
             asked = f"{self.start}:{'' if self.stop is None else self.stop}"
             raise RecordingError(f"`rows`: got {asked}, expected a part of {self.rows} rows that is not empty")

@@ -22,6 +22,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
+from ...errors import RecordingError
 from ...record import Notice
 from .units import plain, units_of
 
@@ -92,6 +93,8 @@ def inferred_columns(names: Sequence[str], taken: Iterable[int], wanted: Iterabl
 def inferred_period(names: Iterable[str]) -> tuple[str, bool] | None:
     """Name of the variable that holds the sample period [s], or with True the sample rate [Hz]; None where none does.
 
+    The names are those of single numbers: a vector `ts` holds times.
+
     >>> inferred_period(["u", "y", "fs"]), inferred_period(["run.Ts"]), inferred_period(["u"])
     (('fs', True), ('run.Ts', False), None)
     """
@@ -100,6 +103,36 @@ def inferred_period(names: Iterable[str]) -> tuple[str, bool] | None:
         if word in _PERIODS or word in _RATES:
             return name, word in _RATES
     return None
+
+
+def period_of(name: str, value: float, is_rate: bool) -> float:
+    """Sample period [s] from the value of a variable that `inferred_period` found.
+
+    Raises
+    ------
+    RecordingError
+        If it is a sample rate that is not positive.
+    """
+    if is_rate and not value > 0.0:
+        raise RecordingError(f"{name}: got a sample rate of {value:g} Hz, expected more than 0; give `sample_period`")
+    return 1.0 / value if is_rate else value
+
+
+def require_different(places: Mapping[str, object]) -> None:
+    """Refuse one column for two channels, e.g. the displacement as the voltage.
+
+    Raises
+    ------
+    RecordingError
+        If two channels have the same place.
+    """
+    taken: dict[object, str] = {}
+    for channel, place in places.items():
+        if place in taken:
+            raise RecordingError(
+                f"`columns`: got the same column for {taken[place]} and {channel}, expected different ones"
+            )
+        taken[place] = channel
 
 
 def inference_notice(found: Mapping[str, str], units: Mapping[str, str | None]) -> tuple[Notice, ...]:

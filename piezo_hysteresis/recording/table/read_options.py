@@ -114,6 +114,9 @@ class ReadOptions:
             raise RecordingError(f"`initial_voltage`: got {self.initial_voltage!r} V, expected a finite voltage")
         if self.average is not None and self.average < 1:
             raise RecordingError(f"`average`: got {self.average}, expected a whole number of samples, 1 or more")
+        first, last = self.rows or (None, None)
+        if last is not None and (first or 0) >= last and ((first or 0) < 0) == (last < 0):
+            raise RecordingError(f"`rows`: got {first or 0}:{last}, expected a part that is not empty")
         columns = {k: int(c) if isinstance(c, str) and c.isdigit() else c for k, c in self.columns.items()}
         for name, column in columns.items():
             if isinstance(column, int) and column < 1:

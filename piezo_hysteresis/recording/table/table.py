@@ -25,7 +25,7 @@ from ...errors import RecordingError
 from ...record import Notice, Record, Samples
 from ..checks.split_at_gaps import split_at_gaps
 from ..segmentation.phases import labelled
-from .column_inference import inference_notice, inferred_columns, unit_in
+from .column_inference import inference_notice, inferred_columns, require_different, unit_in
 from .read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from .time_column import TimeColumn
 from .units import plain, units_of
@@ -109,6 +109,7 @@ def resolve(titles: Sequence[str], width: int, options: ReadOptions) -> Places:
                 f"got {_listed(titles, width)}, expected a column for {channel}; name it by `columns`, e.g. "
                 f"{channel}={free}"
             )
+    require_different({channel: at for channel, (at, _) in places.items() if is_channel(channel)})
     names = {channel: titles[at].strip() for channel, at in found.items()}
     return Places(places, inference_notice(names, {channel: places[channel][1] for channel in found}))
 

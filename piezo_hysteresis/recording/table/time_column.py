@@ -84,6 +84,8 @@ class TimeColumn:
         RecordError
             If there are fewer than two times, or they do not increase.
         """
+        if time.size < 2:
+            raise RecordError("time: got the time of one sample, expected two or more; give `sample_period`")
         steps = np.diff(time)
         forward = steps[steps > 0]
         if not forward.size or not np.isfinite(time).all():
