@@ -174,8 +174,9 @@ def _fitted(sections: Array, signals: Signals) -> tuple[Array, Array]:
         inverse = np.linalg.pinv(basis @ basis.T, rcond=INDEPENDENT, hermitian=True)
         return np.asarray((along @ basis.T @ inverse @ basis - along).T)
 
+    # not "lm": where sections are equal, the first step of SciPy 1.17 depends on what the memory contained before
     fitted = scipy.optimize.least_squares(
-        residual, sections.ravel(), slopes, method="lm", x_scale="jac", ftol=CONVERGED, max_nfev=SIMULATIONS
+        residual, sections.ravel(), slopes, method="trf", x_scale="jac", ftol=CONVERGED, max_nfev=SIMULATIONS
     )
     return fitted.x.reshape(-1, 2), projected(tuple(fitted.x))[0]
 
