@@ -23,6 +23,7 @@ and at the full rate of 50 kHz, as a recorder may store it.
 from __future__ import annotations
 
 import argparse
+import os
 import resource
 import time
 from collections.abc import Collection
@@ -31,7 +32,7 @@ import numpy as np
 
 from benchmarks.figures import Cell, Figures, alone
 from benchmarks.independent_plant import NATIVE, Plant
-from benchmarks.naming_cases import cases
+from benchmarks.naming_cases import Case, cases
 from benchmarks.naming_experiments import ProtocolVariant, rich
 from piezo_hysteresis.discrepancy import diagnose
 from piezo_hysteresis.effects import CATALOGUE, Creep, Effect
@@ -39,6 +40,11 @@ from piezo_hysteresis.record import Experiment
 
 USUAL, LONG, MEMORY = 10.0, 60.0, 4.0
 """Seconds for 150 000 samples, seconds for 8.75 million, GB for these."""
+PAIRS = (
+    Case("pairs", ("rate_dependent_hysteresis", "mains_hum"), 1, 5e-4),
+    Case("pairs", ("softening", "backlash"), 1, 5e-4),
+)
+"""Stages with two effects, whose diagnoses take longer."""
 HALF, NEARLY_ALL = 5.0, 20.0
 """Processor time that half of the diagnoses, and 95 % of them, may take [s]."""
 
@@ -64,7 +70,7 @@ def stage() -> Plant:
 def cost(experiment: Experiment, effects: Collection[type[Effect]] = CATALOGUE) -> tuple[float, str]:
     """Processor time of a diagnosis [s], and its answer."""
     begin = time.process_time()
-    found = diagnose(experiment, effects=effects)
+    found = diagnose(experiment, effects=effects, cores=1)
     return time.process_time() - begin, " and ".join(found.names) or str(found.verdict)
 
 
@@ -116,7 +122,7 @@ def run(options: argparse.Namespace) -> list[Figures]:
         ("effects", "s of one core", "answer"),
         [(count, *outcome) for count, outcome in zip(counts, times, strict=True)],
     )
-    return [samples, library, distribution()]
+    return [samples, library, distribution(), two_cores()]
 
 
 def distribution() -> Figures:
@@ -132,6 +138,28 @@ def distribution() -> Figures:
         [(half, most, float(spent.max()))],
         tuple(failures),
     )
+
+
+def two_cores() -> Figures:
+    """Time that passes with one and with two cores, in turn, for stages with one effect and with two."""
+    single = [case for case in cases(("quick",), 1) if case.truth]
+    rows: list[tuple[Cell, ...]] = []
+    for hidden, members in (("one effect", single), ("two effects", PAIRS)):
+        times = np.array([[elapsed(e, cores) for cores in (1, 2)] for e in (case.experiment() for case in members)])
+        one, two = times.sum(axis=0).tolist()
+        rows.append((hidden, len(members), one, two, one / two))
+    return Figures(
+        f"Diagnosis with one and with two cores, of {os.cpu_count()}; other work on them hides the gain",
+        ("hidden", "stages", "one core, s", "two cores, s", "ratio"),
+        rows,
+    )
+
+
+def elapsed(experiment: Experiment, cores: int) -> float:
+    """Time that a diagnosis takes on a clock [s]."""
+    begin = time.perf_counter()
+    diagnose(experiment, cores=cores)
+    return time.perf_counter() - begin
 
 
 if __name__ == "__main__":

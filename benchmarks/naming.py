@@ -97,7 +97,7 @@ def answer(case: Case, explicit_step: bool = False) -> Outcome:
     """Make the data of a case and diagnose them; the time is the processor time of the diagnosis."""
     experiment = case.experiment()
     begin = time.process_time()
-    found = diagnose(experiment, effects=case.library, explicit_step=explicit_step)
+    found = diagnose(experiment, effects=case.library, explicit_step=explicit_step, cores=1)
     seconds = time.process_time() - begin
     selection, gap = found.selection, found.gap
     steps = selection.steps if selection is not None else ()

@@ -24,13 +24,17 @@ example has a deadline.
 
 A shell starts a background job with SIGINT ignored, and every process below it inherits that. Tests that interrupt
 nodes need the signal to arrive.
+
+Diagnoses use one core, because the processes of the tests share the cores already.
 """
 
+import os
 import signal
 
 import pytest
 from hypothesis import settings
 
+os.environ.setdefault("PYTHON_CPU_COUNT", "1")
 settings.register_profile("patient", deadline=None)
 settings.load_profile("patient")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -33,6 +33,7 @@ from .changes.same_stage import UNCHANGED
 from .diagnosis import Conclusion, Diagnosis, Verdict
 from .diagnosis_state import DiagnosisState
 from .passes import PASSES
+from .search.execution.cores import using_cores
 
 
 @on_one_core
@@ -44,6 +45,7 @@ def diagnose(
     progress: Progress | None = None,
     explicit_step: bool = False,
     time_limit: float = np.inf,
+    cores: int | None = None,
 ) -> Diagnosis:
     """Find where simulation and measurement disagree, name the missing effect, and measure the gap after adding it.
 
@@ -63,6 +65,9 @@ def diagnose(
     time_limit : float
         Time after which the search ends with the best answer so far [s]. It does not limit the baseline before the
         search and the last fit after it.
+    cores : int, optional
+        Largest number of processor cores that are used; by default all that this process may use, or as many as the
+        environment variable PYTHON_CPU_COUNT states. The answer does not depend on it.
 
     Returns
     -------
@@ -72,7 +77,8 @@ def diagnose(
     Raises
     ------
     ParameterError
-        If the time limit is not positive, or `effects` holds something else than classes of effects.
+        If the time limit is not positive, no core may be used, or `effects` holds something else than classes of
+        effects.
     RecordError
         If `experiment` holds no records.
     IdentificationError
@@ -82,13 +88,16 @@ def diagnose(
     """
     if not time_limit > 0.0:
         raise ParameterError(f"diagnose: got a time limit of {time_limit:g} s, expected more than 0 s")
+    if cores is not None and cores < 1:
+        raise ParameterError(f"diagnose: got {cores} cores, expected at least 1")
     other = [e for e in effects if not (isinstance(e, type) and issubclass(e, Effect))]
     if other:
         raise ParameterError(f"diagnose: got {other[0]!r} in effects, expected classes of effects such as Creep")
     end = time.monotonic() + time_limit
     progress = progress or (lambda word, fraction: None)
     state = DiagnosisState(experiment_of(experiment), model, effects, progress, end, explicit_step)
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # diverging trials have a large cost
+    # diverging trials have a large cost
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"), using_cores(cores):
         for run in PASSES:
             found = run(state)
             if isinstance(found, Diagnosis):

@@ -38,9 +38,9 @@ from .residual.localise import ResidualShare, localise
 from .residual.sampling import NOISE_WIDTH, quieted, voltage_noise
 from .search.baseline_setup import BaselineSetup, prepare_baseline
 from .search.cross_validation import ADEQUATE
+from .search.execution.time_limit import ending_at
 from .search.selection import select
 from .search.single_record import diagnose_few
-from .search.time_limit import ending_at
 from .unnamed.correction import without_corrections
 from .verdict import FEWEST_RECORDS
 

@@ -129,7 +129,7 @@ class Diagnose:
         return f"diagnose {_hash(self.model)}"
 
     def __call__(self, experiment: Experiment) -> WorkResult:
-        found = diagnose(experiment, model_file.loads(self.model) if self.model else None)
+        found = diagnose(experiment, model_file.loads(self.model) if self.model else None, cores=1)
         gap = found.gap
         return WorkResult(
             verdict=str(found.verdict),

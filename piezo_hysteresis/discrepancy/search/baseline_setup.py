@@ -38,6 +38,7 @@ from ..residual.sampling import at_period, common_period, less, shortened, slowe
 from .baseline import exact, modal_models, start_models
 from .candidates import score_baseline, score_model
 from .cross_validation import ADEQUATE, Score
+from .execution.cores import start_helpers
 from .refit import FAILURES, LAST, PRECISE, clearly_better, joint
 from .selection_result import Selection
 from .test_records import reporting
@@ -174,6 +175,7 @@ def prepare_baseline(
         baseline = joint(baseline.model, training_data, LAST, PRECISE)
     training_data, score = score_baseline(baseline.model, training_data)
     if score.excess > ADEQUATE:
+        start_helpers()  # effects will be searched for
         baseline, score = _best(baseline, score, starts, training_data)
     if score.excess > ADEQUATE:
         for modal in modal_models(baseline.model, records, fitted):

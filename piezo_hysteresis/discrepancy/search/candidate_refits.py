@@ -18,12 +18,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from ...effects.effect import ChainPosition
 from ...identification.fit.fit import Progress
 from ...model.model import Model
 from .candidates import Candidate, FittedCandidate
 from .cross_validation import ADEQUATE, Score
+from .execution.cores import on_cores
 from .refit import from_all_starts, proceed, refit, restart
 
 LEAST_GAIN = 0.15
@@ -51,33 +53,38 @@ def refit_candidates(
 ) -> list[FittedCandidate]:
     """Joint refits, best first: few linearisations for all, then new dynamics, then convergence for the best ones."""
     refits: list[FittedCandidate] = []
-    for k, candidate in enumerate(candidates):
-        if refits and _is_far_behind(candidate, refits[0], before):
-            continue
-        progress(f"refit with {candidate.name}", (k + 1) / (len(candidates) + 2))
-        result = refit(model, candidate, FIRST)
+    progress("refits of the candidates", 0.2)
+    first = partial(refit, model, max_iterations=FIRST)
+    for _, result in on_cores(first, candidates, lambda c: not any(_is_far_behind(c, r, before) for r in refits)):
         if result is not None:
-            refits = sorted([*refits, result], key=lambda c: c.score.cost)
-    if not refits:
-        return []
-    progress("new estimate of the dynamics", 0.8)
-    leader = _anew(refits[0])
-    field = [
-        leader,
-        *(c if k >= AGAIN or _is_far_behind(c, leader, before) else _anew(c) for k, c in enumerate(refits[1:], 1)),
-    ]
-    field.sort(key=lambda c: c.score.cost)
-    progress(f"refit with {field[0].name}", 0.9)
-    best = settled(field[0], before)
-    reach = best.score.cost + CLOSE * max(before.cost - best.score.cost, LEAST_GAIN)
-    rest = [settled(c, before) if c.score.cost < reach else c for c in field[1:]]
-    return sorted([best, *rest], key=lambda c: c.score.cost)
+            refits.append(result)
+    refits.sort(key=_cost)
+    progress("new estimate of the dynamics", 0.6)
+    anew = list[FittedCandidate]()
+    for _, result in on_cores(_anew, refits[:AGAIN], lambda c: not (anew and _is_far_behind(c, anew[0], before))):
+        anew.append(result)
+    renewed = {c.name for c in anew}
+    field = sorted([*anew, *(c for c in refits if c.name not in renewed)], key=_cost)
+    progress("refits of the best candidates", 0.8)
+    found = list[FittedCandidate]()
+    for _, result in on_cores(
+        partial(settled, before=before), field, lambda c: not found or _is_close(c, found[0], before)
+    ):
+        found.append(result)
+    converged = {c.name for c in found}
+    return sorted([*found, *(c for c in field if c.name not in converged)], key=_cost)
 
 
 def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
     """Refits of effects of the drive and the loop that the dynamics have absorbed, so that no score test shows them."""
-    anew = (from_all_starts(model, c, FIRST) for c in candidates if _bends_dynamics(c))
-    return [settled(c, before) for c in anew if c is not None]
+    bending = [c for c in candidates if _bends_dynamics(c)]
+    found = on_cores(partial(_settled_from_all_starts, model, before), bending)
+    return [c for _, c in found if c is not None]
+
+
+def _settled_from_all_starts(model: Model, before: Score, candidate: Candidate) -> FittedCandidate | None:
+    found = from_all_starts(model, candidate, FIRST)
+    return None if found is None else settled(found, before)
 
 
 def _bends_dynamics(candidate: Candidate) -> bool:
@@ -92,9 +99,14 @@ def refits_of_twins(candidates: Sequence[Candidate], best: FittedCandidate, befo
 
     Each refit begins with the fitted model of the best one, because the loop is the same.
     """
-    twins = (c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name)
-    beside = (refit(best.fit.model.without(best.name), c, LATER) for c in twins)
-    return [settled(c, before) for c in beside if c is not None]
+    twins = [c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name]
+    found = on_cores(partial(_settled_refit, best.fit.model.without(best.name), before), twins)
+    return [c for _, c in found if c is not None]
+
+
+def _settled_refit(model: Model, before: Score, candidate: Candidate) -> FittedCandidate | None:
+    found = refit(model, candidate, LATER)
+    return None if found is None else settled(found, before)
 
 
 def _anew(candidate: FittedCandidate) -> FittedCandidate:
@@ -106,6 +118,15 @@ def _is_far_behind(candidate: Candidate, best: FittedCandidate, before: Score) -
     """Whether the best candidate is at the floor and the other one so far above it that it is not a rival."""
     most = 2.0 * LEAST_GAIN if best.score.cost <= LEAST_GAIN else HOPELESS_BESIDE * (before.cost - best.score.cost)
     return best.score.excess <= ADEQUATE and candidate.score.cost - best.score.cost > most
+
+
+def _is_close(candidate: Candidate, best: FittedCandidate, before: Score) -> bool:
+    """Whether a candidate is a rival of the best one."""
+    return candidate.score.cost < best.score.cost + CLOSE * max(before.cost - best.score.cost, LEAST_GAIN)
+
+
+def _cost(candidate: Candidate) -> float:
+    return candidate.score.cost
 
 
 def settled(candidate: FittedCandidate, before: Score) -> FittedCandidate:

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,7 @@ from ...identification.fit.fit import Fit, gauge
 from ...identification.fit.normal_equations import Gram, grams
 from ...model.model import Model
 from .cross_validation import Score, cross_validate, indispensable
+from .execution.cores import on_cores
 from .training_data import TrainingData
 
 Array = NDArray[np.float64]
@@ -139,23 +141,26 @@ def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Eff
     starts = [
         (effect, effect.starts(training_data.extent)) for effect in effects if _fits(model, training_data, effect)
     ]
-    found: list[Candidate] = []
+    groups: list[list[Effect]] = [[s for _, many in starts for s in many if not s.is_off]]
     for turn in range(max((len(s) for _, s in starts), default=0)):
-        members = [s[turn] for _, s in starts if turn < len(s) and s[turn].is_off and s[turn].name != MainsHum.name]
-        if members:
-            found += _screen_off(model, training_data, base, members)
-    moves = [s for _, many in starts for s in many if not s.is_off]
-    if moves:
-        found += _screen_moves(model, training_data, base, moves)
-    if any(effect is MainsHum for effect, _ in starts):
-        for hum in MainsHum.starts(training_data.extent):
-            with_hum = training_data.with_hum(hum["f"])
-            found.append(Candidate(hum, with_hum, score_model(model, with_hum)))
+        groups.append([s[turn] for e, s in starts if turn < len(s) and s[turn].is_off and e is not MainsHum])
+    groups += [[hum] for effect, s in starts if effect is MainsHum for hum in s]
     best: dict[str, Candidate] = {}
-    for candidate in found:
-        if candidate.name not in best or candidate.score.cost < best[candidate.name].score.cost:
-            best[candidate.name] = candidate
+    for _, found in on_cores(partial(_screen_group, model, training_data, base), [g for g in groups if g]):
+        for candidate in found:
+            if candidate.name not in best or candidate.score.cost < best[candidate.name].score.cost:
+                best[candidate.name] = candidate
     return sorted(best.values(), key=lambda c: c.score.cost)
+
+
+def _screen_group(model: Model, training_data: TrainingData, base: list[str], group: list[Effect]) -> list[Candidate]:
+    """Score test of effects that share one pass over the data."""
+    if not group[0].is_off:
+        return _screen_moves(model, training_data, base, group)
+    if isinstance(group[0], MainsHum):
+        with_hum = training_data.with_hum(group[0]["f"])
+        return [Candidate(group[0], with_hum, score_model(model, with_hum))]
+    return _screen_off(model, training_data, base, group)
 
 
 def _fits(model: Model, training_data: TrainingData, effect: type[Effect]) -> bool:

@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 
 from ...effects import Arx
 from ...errors import DivergenceError, IdentificationError, ModelError, ParameterError
@@ -34,7 +34,8 @@ from ...identification.steps.modes import identify_modes
 from ...model.model import Model
 from .candidates import Candidate, FittedCandidate, free_numbers, score_model
 from .cross_validation import Score
-from .time_limit import check_time
+from .execution.cores import on_cores
+from .execution.time_limit import check_time
 from .training_data import TrainingData
 
 TOLERANCE = 1e-3
@@ -136,8 +137,8 @@ def restart(candidate: FittedCandidate, max_iterations: int) -> FittedCandidate:
     models = [candidate.fit.model]
     if (first := candidate.training_data.start) is not None:
         models.append(reduce(Model.with_effect, [e for e in models[0].effects if e.name not in first], first))
-    found = [_behind_anew(m, candidate.training_data) for m in models]
-    start = min((f for f in found if f is not None), key=lambda f: f.score.cost, default=None)
+    found = on_cores(partial(_behind_anew, training_data=candidate.training_data), models)
+    start = min((f for _, f in found if f is not None), key=lambda f: f.score.cost, default=None)
     anew = None if start is None else _refitted(start.model, candidate, max_iterations)
     return candidate if anew is None or anew.fit.cost >= candidate.fit.cost else anew
 

@@ -39,9 +39,9 @@ from .candidate_refits import (
 )
 from .candidates import FittedCandidate, screen
 from .cross_validation import ADEQUATE, Score
+from .execution.time_limit import TimeSpentError
 from .refit import Fitted, without
 from .selection_result import Rejection, Selection, Step, typical
-from .time_limit import TimeSpentError
 from .training_data import TrainingData
 
 ALONE = 4.0

@@ -47,13 +47,14 @@ from ..verdict import FEWEST_RECORDS, NAMED, conclusion_of
 from .baseline import with_zero
 from .candidates import loop_is_off, score_model
 from .cross_validation import ADEQUATE, Score
+from .execution.cores import start_helpers
+from .execution.time_limit import ending_at
 from .record_blocks import training_data_of
 from .refit import joint
 from .selection import select
 from .selection_result import Selection, Step, explained
 from .structure_steps import structure_steps
 from .test_records import reporting
-from .time_limit import ending_at
 
 LAST, PRECISE = 25, 1e-6
 """Largest number of linearisations of a fit, and relative decrease of the cost at convergence."""
@@ -114,6 +115,8 @@ def diagnose_few(
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
     baseline = joint(with_zero(published), training_data, LAST, PRECISE)
     before = score_model(baseline.model, training_data)
+    if before.excess > ADEQUATE:
+        start_helpers()  # effects will be searched for
     progress("location of the residual", 0.5)
     left = residuals(baseline.model, records, Nuisance(offset=True))
     where = localise([records[i] for i in fitted], [left[i] for i in fitted], [least[i] for i in fitted])

@@ -45,6 +45,11 @@ def ending_at(end: float) -> Iterator[None]:
         _END.reset(before)
 
 
+def end_of_search() -> float:
+    """Time at which the search of this context has to end, on the clock of `time.monotonic` [s]."""
+    return _END.get()
+
+
 def check_time() -> None:
     """Check the time limit of the search.
 
