@@ -90,7 +90,7 @@ def reachable(
     parts = _parts(off, needed, span, limits, model, limited.preview, aim)
     nearest = None
     if parts and search:
-        nearest = _nearest(model, limits, y, state, band, approximate)
+        nearest = nearest_path(model, limits, y, state, band=band, approximate=approximate)
     return Reachability(parts, nearest, reached, given)
 
 
@@ -152,9 +152,29 @@ def _at_the_lowest_voltage(model: Model, limits: Limits) -> tuple[float, float]:
     return at, float(np.sign(above - at))
 
 
-def _nearest(
-    model: Model, limits: Limits, y: Array, state: ChainState, band: Band | None, approximate: bool
+def nearest_path(
+    model: Model,
+    limits: Limits,
+    y: Array,
+    state: ChainState,
+    *,
+    band: Band | None = None,
+    approximate: bool = False,
+    approach: float = APPROACH,
 ) -> NearestPath:
+    """The nearest path that can be reached, after an approach from the present position of the stage.
+
+    Parameters
+    ----------
+    model, limits, band, approximate
+        As for `reachable`.
+    y : (n,) ndarray
+        Displacement of the path, without the approach [m].
+    state : ChainState
+        State of the model before the approach.
+    approach : float
+        Duration of the approach [s].
+    """
     span, middle = float(np.ptp(y)), 0.5 * float(y.min() + y.max())
 
     def is_whole(path: Array, low_pass: Band | None = band) -> bool:
@@ -166,7 +186,7 @@ def _nearest(
 
     def with_approach(path: Array) -> Array:
         """The path after an approach from the present position of the stage."""
-        way = smooth_transition(at_start, float(path[0]), round(APPROACH / model.sample_period))
+        way = smooth_transition(at_start, float(path[0]), round(approach / model.sample_period))
         return np.concatenate((way, path))
 
     most = span or model.displacement_scale

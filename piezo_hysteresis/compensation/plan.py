@@ -30,7 +30,7 @@ from .approach import APPROACH, settled_start, smooth_transition
 from .band import Band
 from .expected_error import ExpectedError, free_run_error, parameter_error
 from .inverse import Inverse
-from .limit_check import reachable
+from .limit_check import nearest_path, reachable
 from .limits import Limits
 from .reachability import Reachability
 
@@ -150,14 +150,17 @@ def plan(
     """
     y, limits = samples(wanted, "displacement"), limits.resolved
     for name, duration in (("approach", approach), ("way_back", way_back)):
-        if not duration >= 0.0:
-            raise ModelError(f"{name}: got {duration!r} s, expected zero or more")
+        if not 0.0 <= duration < math.inf:
+            raise ModelError(f"{name}: got {duration!r} s, expected zero or a finite time")
     state = start or settled_start(model, limits)
     band = band or Band.of(model.sample_period)
     at = float(model.run([state.inputs[0]], state)[0][0])
     way = smooth_transition(at, float(y[0]), round(approach / model.sample_period))
     whole = np.concatenate((way, y))
-    found = reachable(model, limits, whole, start=state, band=band, approximate=approximate)
+    found = reachable(model, limits, whole, start=state, band=band, approximate=approximate, search=False)
+    if found.parts:  # what is changed is the path alone: the approach begins where the stage is
+        nearest = nearest_path(model, limits, y, state, band=band, approximate=approximate, approach=approach)
+        found = replace(found, nearest=nearest)
     late = way.size * model.sample_period
     parts = tuple(replace(part, begin=part.begin - late, end=part.end - late) for part in found.parts)
     found = replace(found, parts=parts)

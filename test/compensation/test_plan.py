@@ -65,6 +65,24 @@ def test_zero_after_a_loop_on_unipolar_drive_needs_a_negative_voltage() -> None:
     assert reachable(model, Limits(-2.0, 10.0), y).is_whole
 
 
+@pytest.mark.parametrize(("low", "high"), [(0.8, 1.4), (0.5, 1.1)])
+def test_what_a_plan_proposes_is_a_plan_without_complaint(low: float, high: float) -> None:
+    """What is shifted and scaled is the path, and not the approach to it, which begins where the stage is."""
+    model, limits = stage(), Limits(0.0, 4.0)
+    top = float(model.run([4.0], model.rest(4.0))[0][0])
+    y = swing(50.0, low * top, high * top, 1)
+    refused = plan(model, y, limits, approach=0.01).reachability
+    assert refused.nearest is not None and refused.nearest.offset is not None
+    assert plan(model, y + refused.nearest.offset, limits, approach=0.01).reachability.is_whole
+    if low + high > 2.0:
+        assert refused.nearest.amplitude is None, "the middle of the path is out of reach itself"
+    else:
+        assert refused.nearest.amplitude is not None
+        middle = 0.5 * (y.min() + y.max())
+        smaller = middle + refused.nearest.amplitude * (y - middle)
+        assert plan(model, smaller, limits, approach=0.01).reachability.is_whole
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_only_what_rest_reaches_is_said_to_be_kept_by_the_hysteresis(sign: float) -> None:
     loop = BoucWen()
