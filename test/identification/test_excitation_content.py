@@ -63,12 +63,35 @@ def test_growing_waves_of_three_rates_in_one_record_are_not_broadband(cycles, tr
     assert not found.is_broadband
 
 
-def test_noise_chirps_and_many_steps_are_broadband(random):
+def test_noise_and_chirps_are_broadband(random):
     time = 1e-4 * np.arange(20_000)
     chirp = np.sin(2 * np.pi * 1.0 * np.expm1(np.log(500.0) / 2.0 * time) / np.log(500.0) * 2.0)
-    steps = np.repeat(np.tile([0.0, 1.0], 10), 1000)
-    for voltage in (random.standard_normal(20_000), 5.0 + 0.01 * random.standard_normal(20_000), chirp, steps):
+    binary = np.repeat(random.choice([1.0, 9.0], 2000), 10)
+    short = np.repeat(random.uniform(0.0, 10.0, 200), 100)  # held for 10 ms, while the stage still rings
+    noise = random.standard_normal(20_000)
+    for voltage in (noise, 5.0 + 0.01 * noise, chirp, binary, short):
         assert content(voltage, 1e-4).is_broadband
+        assert not content(voltage, 1e-4).levels
+
+
+LEVELS = np.concatenate((np.linspace(0.0, 10.0, 21), np.linspace(10.0, 0.0, 21)[1:]))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 5e-4])
+@pytest.mark.parametrize(
+    "voltage",
+    [np.repeat(LEVELS, 500), np.repeat(np.tile([0.0, 1.0], 10), 1000), np.repeat(LEVELS, 60)],
+    ids=["staircase", "square", "fast staircase"],
+)
+def test_many_steps_show_the_same_step_response_only(voltage, noise, random):
+    voltage = voltage + noise * np.ptp(voltage) * random.standard_normal(voltage.size)
+    assert content(voltage, 1e-3).levels
+    assert not content(voltage, 1e-3).is_broadband
+
+
+def test_ramps_between_levels_are_changes_of_one_way():
+    ramped = np.interp(np.arange(20_500), (500 * np.arange(41)[:, None] + [20, 500]).ravel(), np.repeat(LEVELS, 2))
+    assert content(ramped, 1e-3).levels
 
 
 def test_a_fast_triangle_after_a_hold_does_not_determine_the_dynamics():

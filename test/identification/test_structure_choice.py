@@ -220,3 +220,14 @@ def test_a_gain_that_rises_with_the_frequency_shows_a_mode_without_a_step():
     (notice,) = (n for n in found.notices if n.kind == "ringing")
     assert "the gain rises with the frequency" in notice.message
     assert max(percents(found.model, Experiment((record(50.0),)))) < 0.3
+
+
+def test_a_staircase_shows_creep_and_the_ringing_of_its_steps():
+    """Its step response repeats; dynamics of high order fitted to it take the place of creep."""
+    levels = np.linspace(0.0, 10.0, 21)
+    drive = np.repeat(np.concatenate((levels, levels[-2::-1])), 200)
+    found = identify(Experiment((STAGE.play(drive, PERIOD, "staircase"),)), memory=True)
+    assert found.fit.converged
+    assert {"creep", "creep_two_rates"} & {e.name for e in found.model.effects}
+    assert found.model[ExtraResonance.name]["f0"] == pytest.approx(STAGE.mode, rel=0.01)
+    assert max(percents(found.model, played(STAGE, (1.0, 10.0)))) < 0.3

@@ -38,6 +38,12 @@ UNMEASURED = 5e-4
 """Share of the range below which the highest frequencies of a drive are noise of the recorder and not excitation."""
 MOVES = 0.02
 """Share of the largest range of the drive from which a record shows frequencies; below it is a rest."""
+RINGS = 0.05
+"""Longest ringing of a stage after a step [s]; a drive that is held for longer shows the same step response again."""
+HELD = 32
+"""Smallest number of samples of such a hold."""
+ONE_WAY = 0.9
+"""Share of the motion of such a drive that the net changes between its levels are."""
 GAUSSIAN = 1.4826
 """Standard deviation over median absolute value."""
 
@@ -63,6 +69,8 @@ class ExcitationContent:
         Standard deviation of the sensor noise [m].
     waves : bool
         Whether the drive consists of sines or triangles of a few rates, one after another.
+    levels : bool
+        Whether the drive moves from level to level and is held there: every change shows the same step response.
     """
 
     span: float
@@ -72,16 +80,18 @@ class ExcitationContent:
     moments: float
     noise: float
     waves: bool = False
+    levels: bool = False
 
     @property
     def is_broadband(self) -> bool:
         """True if the drive determines linear dynamics."""
-        return self.bandwidth > SLOW and self.lines >= MANY_LINES and self.moments >= MANY_MOMENTS and not self.waves
+        is_rich = self.bandwidth > SLOW and self.lines >= MANY_LINES and self.moments >= MANY_MOMENTS
+        return is_rich and not (self.waves or self.levels)
 
     @property
     def is_step(self) -> bool:
-        """True if the drive changes in a few samples only, so that its spectrum has no end."""
-        return self.moments < MANY_MOMENTS
+        """True if the drive changes in a few samples only, or from level to level: its spectrum has no end."""
+        return self.moments < MANY_MOMENTS or self.levels
 
     @property
     def is_slow(self) -> bool:
@@ -105,7 +115,8 @@ def excitation_content(record: Record) -> ExcitationContent:
     lines = int(np.searchsorted(np.cumsum(np.sort(power)[::-1]), MARKED * total)) + 1
     moments = min(_spread(speed), _spread(np.diff(speed)))
     waves = is_row_of_waves(record.voltage, record.sample_period, bandwidth)
-    return ExcitationContent(span, bandwidth, slowest, lines, moments, noise_of(record), waves)
+    levels = _holds_levels(record.voltage, max(HELD, round(RINGS / record.sample_period)))
+    return ExcitationContent(span, bandwidth, slowest, lines, moments, noise_of(record), waves, levels)
 
 
 def moving(contents: Sequence[ExcitationContent]) -> list[ExcitationContent]:
@@ -124,6 +135,19 @@ def _excitation(speed: Samples, span: float) -> NDArray[np.complex128]:
     beyond = np.cumsum(position[::-1])[::-1]  # power of v from each line on [V²]
     spectrum[1:][beyond < (UNMEASURED * span) ** 2] = 0.0
     return spectrum
+
+
+def _holds_levels(voltage: Samples, held: int) -> bool:
+    """Whether the drive is held for so many samples after every change, and every change goes one way."""
+    change = np.diff(voltage)
+    if change.size < held:
+        return False
+    moves = np.flatnonzero(np.abs(change) > 6.0 * noise_on_motion(voltage, 3))
+    if not np.sum(change[moves] ** 2) > 0.5 * np.sum(change**2):
+        return False  # it is noise
+    starts = np.flatnonzero(np.concatenate(([True], np.diff(moves) >= held)))
+    net = np.add.reduceat(change[moves], starts)
+    return float(np.abs(net).sum()) >= ONE_WAY * float(np.abs(change[moves]).sum())
 
 
 def _spread(values: Samples) -> float:

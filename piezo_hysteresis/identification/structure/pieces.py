@@ -23,6 +23,7 @@ from enum import StrEnum
 import numpy as np
 
 from ...record import Record, Samples
+from ..records.excitation_content import RINGS
 from ..records.leading_step import step_length
 from ..records.steady_waves import find_turns
 
@@ -35,18 +36,15 @@ AMPLITUDES = 3
 FEWEST = 32
 """Smallest number of samples in a piece."""
 MOST = 24
-"""Number of pieces from which a record is cut into equal pieces instead, because its drive has no single rates.
-
-With more steps than this, a record is cut by the rates of its drive only.
-"""
+"""Number of pieces from which a record is cut into equal pieces instead, because its drive has no single rates."""
+MOST_STEPS = 100
+"""Largest number of steps of a record that become pieces; of more steps, every second, third, … is used."""
 EQUAL = 5
 """Number of equal pieces into which such a record is cut."""
-JUMP = 0.02
+JUMP = 0.01
 """A change of the drive between two samples is a step if it is larger than this share of the range, and then held."""
 STILL = 1e-3
 """The drive counts as held while it stays within this share of its range."""
-RINGS = 0.05
-"""Longest ringing after a step [s]; at most a quarter of the hold that follows."""
 
 
 class Kind(StrEnum):
@@ -146,8 +144,9 @@ def _steps(record: Record, largest: float, before: float) -> list[tuple[int, int
     """First sample, end of the ringing and end of the hold of every jump after which the drive is held."""
     u = record.voltage
     jumps = np.flatnonzero(np.abs(np.diff(u, prepend=before)) > JUMP * largest)
+    long = jumps[np.diff(jumps, append=u.size) >= FEWEST]
     found = []
-    for jump in jumps.tolist():
+    for jump in long[:: 1 + long.size // MOST_STEPS].tolist():
         if np.ptp(u[jump : jump + FEWEST]) > 2.0 * STILL * largest:
             continue
         leaves = np.abs(u[jump:] - u[jump]) > STILL * largest
@@ -155,8 +154,6 @@ def _steps(record: Record, largest: float, before: float) -> list[tuple[int, int
         first = min(held // 4, max(FEWEST, round(RINGS / record.sample_period)))
         if first >= FEWEST:
             found.append((jump, jump + first, jump + held))
-        if len(found) > MOST:
-            return []
     if jumps.size and jumps[0] == 0 and (not found or found[0][0] > 0):
         length = 0 if record.continues else step_length(record)
         found = [(0, length, length), *(f for f in found if f[0] >= length)] if length else found
