@@ -26,6 +26,7 @@ from ..model.model import Model
 from ..parameter import slew_text
 from ..record import Experiment, Notice, Record
 from .records.excitation_content import MOVES, excitation_content, moving
+from .steps.remaining_lag import error_of_lag
 
 LOWEST, HIGHEST = "voltage_min", "voltage_max"
 """Keys of the provenance: voltages [V]."""
@@ -33,8 +34,10 @@ SLOWEST, FASTEST = "frequency_min", "frequency_max"
 """Keys of the provenance: frequencies between which 90 % of the power of dv/dt lies [Hz]."""
 STEEPEST = "slew_rate_max"
 """Key of the provenance: rate that is exceeded in 1 % of the moving samples [V/s]."""
+LAG_ERROR = "lag_uncertainty"
+"""Key of the provenance: half of the 95 % interval of the lag [s]; absent if broadband records show the dynamics."""
 KEYS = (LOWEST, HIGHEST, SLOWEST, FASTEST, STEEPEST)
-"""All of them."""
+"""The range."""
 BEYOND, FASTER, SLOWER = 0.02, 1.5, 3.0
 """Share of the voltage range, and factors of frequency and rate, from which a drive is outside.
 
@@ -102,7 +105,7 @@ def _outside_of(model: Model, record: Record) -> Iterator[Notice]:
     drive_moves = content.span >= MOVES * (high - low)
     if drive_moves and content.bandwidth > FASTER * fastest > 0.0:
         said = f"the drive reaches {content.bandwidth:.3g} Hz, the model was identified up to {fastest:.3g} Hz"
-        yield Notice("outside_frequencies", said, record.phase)
+        yield Notice("outside_frequencies", said + _lag_error(model, content.bandwidth), record.phase)
     if drive_moves and SLOWER * content.slowest < slowest and content.bandwidth > 0.0:
         said = f"the drive is as slow as {content.slowest:.3g} Hz, the model was identified from {slowest:.3g} Hz"
         yield Notice("outside_frequencies", said, record.phase)
@@ -110,6 +113,15 @@ def _outside_of(model: Model, record: Record) -> Iterator[Notice]:
     if rate > FASTER * steepest > 0.0:
         said = f"the drive changes by {slew_text(rate, 4)}, the model was identified up to {slew_text(steepest, 4)}"
         yield Notice("outside_rates", said, record.phase)
+
+
+def _lag_error(model: Model, frequency: float) -> str:
+    """What the uncertainty of the lag means at a frequency, as the end of a sentence."""
+    if LAG_ERROR not in model.provenance:
+        return ""
+    late = float(model.provenance[LAG_ERROR])
+    share = 100.0 * error_of_lag(late, frequency)
+    return f"; its lag is known within {1e3 * late:.2g} ms, which alone allows an error of {share:.2g} % of the range"
 
 
 def _slew_rate(record: Record) -> float:

@@ -36,7 +36,7 @@ from .fit.form_uncertainty import ADEQUACY, with_form_uncertainty
 from .fit.joint import fit_dynamics, fit_lag
 from .fit.normal_equations import Nuisance, residuals
 from .identification import INSEPARABLE, Identification, correlated_pairs, phase_errors, undetermined
-from .identified_range import identified_range
+from .identified_range import LAG_ERROR, identified_range
 from .inputs import check_gauge, experiment_of
 from .one_core import on_one_core
 from .published_steps import delay_of_steps, published_steps
@@ -50,7 +50,7 @@ from .steps.dynamics import Dynamics, delay_of
 from .steps.hysteresis_choice import choose_memory
 from .steps.linear_start import hysteresis_signals
 from .steps.order_choice import OrderError, choose_order, compare_orders
-from .steps.remaining_lag import lag_notices
+from .steps.remaining_lag import lag, lag_notices
 from .steps.three_steps import behind_the_gauge
 from .structure.structure_choice import StructureChoice, choose_structure
 
@@ -230,4 +230,5 @@ def identify(
     origin = {**origin, **identified_range(records, roles.fitted)}
     if not roles.broadband:
         origin |= identified_periods(records[i].sample_period for i in roles.fitted)
+        origin |= {LAG_ERROR: f"{1.96 * lag(joint)[1]:.4g}"}
     return replace(found, model=replace(joint.stated_model, provenance=origin))

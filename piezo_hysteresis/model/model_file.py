@@ -46,6 +46,7 @@ _PROVENANCE = {
     "frequency_min": "Hz; 95 % of the power of dv/dt lies above it",
     "frequency_max": "Hz; 95 % of it lies below it",
     "slew_rate_max": "V/s; that of 99 % of the samples that move",
+    "lag_uncertainty": "s; half of the 95 % interval of the lag, which no broadband record shows",
     "sample_periods": "s; of those records, where none is broadband",
 }
 """Comments beside the entries of the provenance."""

@@ -14,11 +14,17 @@
 
 """A model says outside of which voltages and frequencies it was not identified."""
 
-import numpy as np
+import re
 
+import numpy as np
+import pytest
+
+from benchmarks.nanopositioner import Nanopositioner
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.identification.identified_range import identified_range, outside
+from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.range_watch import RangeWatch
+from piezo_hysteresis.identification.steps.remaining_lag import error_of_lag
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 
@@ -71,6 +77,36 @@ def test_one_swing_of_a_slow_drive_does_not_show_a_frequency():
     watch = RangeWatch(model, 1e-3)
     watch.add(sine(3.0, 2.0).voltage[:100])
     assert watch.findings() == ()
+
+
+def test_the_bound_of_an_uncertain_lag_covers_a_fast_drive():
+    """One rate without a step cannot tell a lag from creep, so 60 Hz is predicted badly; the notice says how badly."""
+    stage, period = Nanopositioner(mode=700.0, creep_fast=0.006, creep_slow=0.016), 5e-4
+
+    def played(frequency):
+        swing = 1.0 - np.cos(2.0 * np.pi * frequency * period * np.arange(round(2.0 / frequency / period)))
+        return stage.play(np.concatenate([level * swing for level in (1.0, 2.0, 3.0, 4.0, 5.0)]), period)
+
+    found = identify(Experiment((played(1.0),)), memory=True)
+    (said,) = (n.message for n in found.notices if n.kind == "lag_only")
+    fast = played(60.0)
+    (warning,) = (n.message for n in outside(found.model, Experiment((fast,))) if n.kind == "outside_frequencies")
+    allowed = 100.0 * error_of_lag(float(found.model.provenance["lag_uncertainty"]), 60.0)
+    error = 100.0 * np.std(fast.displacement - found.model.simulate(fast)[0]) / np.ptp(fast.displacement)
+    assert 0.65 < error < allowed < 35.0
+    assert "its lag is known within" in warning
+    known_to = float(re.search(r"above ([\d.]+) Hz, this uncertainty allows", said).group(1))
+    assert 100.0 * error_of_lag(float(found.model.provenance["lag_uncertainty"]), known_to) == pytest.approx(
+        1.0, rel=0.05
+    )
+
+
+def test_the_error_of_a_late_sine_is_that_of_the_difference():
+    time = np.arange(60_000) / 60_000
+    for late in (1e-5, 1e-3, 8e-3):
+        off = np.sin(2.0 * np.pi * 60.0 * time) - np.sin(2.0 * np.pi * 60.0 * (time - late))
+        assert error_of_lag(late, 60.0) == pytest.approx(np.std(off) / 2.0, rel=1e-6)
+    assert error_of_lag(1.0, 60.0) == pytest.approx(0.5**0.5)
 
 
 def test_a_model_without_its_range_gives_no_notice():

@@ -28,6 +28,8 @@ from .linear_start import dynamics_of
 
 ONE_FREQUENCY = 4
 """Largest number of spectral lines of a drive with one frequency."""
+STATED = 0.01
+"""Error, as a share of the range of a sine, for which the notice states the frequency."""
 
 
 def lag(fit: Fit) -> tuple[float, float]:
@@ -46,6 +48,17 @@ def lag(fit: Fit) -> tuple[float, float]:
     return value, float(np.sqrt(max(variance, 0.0)))
 
 
+def error_of_lag(late: float, frequency: float) -> float:
+    """RMS error of a sine that is `late` [s] too late, as a share of its range: sin(π f t)/√2.
+
+    Examples
+    --------
+    >>> round(error_of_lag(50e-6, 60.0), 5)
+    0.00666
+    """
+    return float(np.sin(min(np.pi * frequency * late, 0.5 * np.pi)) / np.sqrt(2.0))
+
+
 def lag_notices(fit: Fit, contents: Sequence[ExcitationContent], *, rivals_counted: bool = False) -> tuple[Notice, ...]:
     """Notices ``lag_only``, and ``one_frequency`` if lag and hysteresis cannot be distinguished.
 
@@ -62,13 +75,15 @@ def lag_notices(fit: Fit, contents: Sequence[ExcitationContent], *, rivals_count
     driven = moving(contents)
     highest = max([c.bandwidth for c in driven if not c.is_step] or [0.0])
     ends = f"no record is broadband and the drive ends at {highest:.3g} Hz" if highest else "no record is broadband"
+    known_to = np.arcsin(STATED * np.sqrt(2.0)) / (np.pi * 1.96 * error) if error > 0.0 else np.inf
     besides = " besides the mode" if ExtraResonance.name in fit.model else ""
     notices = [
         Notice(
             "lag_only",
             f"{ends}, so only a lag is reported for the dynamics{besides}, "
-            f"{1e3 * value:.4g} ms ± {1.96e3 * error:.2g} ms (95 %); record noise, a chirp or "
-            "steps to identify the dynamics",
+            f"{1e3 * value:.4g} ms ± {1.96e3 * error:.2g} ms (95 %); above "
+            f"{known_to:.2g} Hz, this uncertainty allows an error of more than {100 * STATED:.0f} % of the range; "
+            "record noise or a chirp to identify the dynamics",
         )
     ]
     if max(c.lines for c in driven) <= ONE_FREQUENCY and max(c.bandwidth for c in driven) <= 1.5 * min(
