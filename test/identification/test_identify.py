@@ -20,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.nanopositioner import Nanopositioner
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.errors import IdentificationError, RecordError
 from piezo_hysteresis.identification import DriveLimits, identify
@@ -245,6 +246,14 @@ def test_a_stage_that_lags_by_less_than_a_sample_is_identified():
     assert found.model["arx"]["delay"] == pytest.approx(0.0, abs=0.1)
     assert found.model.sample_period == 5e-3
     assert any(n.kind == "lag_only" for n in found.notices)
+
+
+@pytest.mark.parametrize("levels", [(2.0, 8.0), (0.0, 10.0)])
+def test_a_binary_drive_alone_is_identified(levels):
+    """Two levels hardly determine the height of a loop; a start outside its bounds was an error."""
+    drive = np.repeat(np.random.default_rng(1).choice(levels, 400), 20)
+    record = Nanopositioner.random(np.random.default_rng(3)).play(drive, 1e-3, "noise")
+    assert identify(record, memory=True).free_run_percent < 0.3
 
 
 def test_phases_that_are_held_out_must_exist():

@@ -107,7 +107,10 @@ class ModifiedBoucWen(HysteresisOperator):
     def started(self, loops: Sequence[Loop]) -> Self:
         from .bouc_wen_start import closest_loop  # imports scipy.optimize, which would delay the start of nodes
 
-        return self.with_values(**closest_loop(loops))
+        # a drive with two levels hardly determines the loop, whose height can then be any number
+        rows = {p.name: p for p in self.parameters}
+        found = closest_loop(loops).items()
+        return self.with_values(**{n: min(max(v, rows[n].lower), rows[n].upper) for n, v in found})
 
 
 class BoucWen(ModifiedBoucWen):
