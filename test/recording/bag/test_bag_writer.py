@@ -99,11 +99,10 @@ def test_a_bag_is_never_overwritten_and_never_guessed(tmp_path):
         bag.write("/x", 0, PhaseNames.to_cdr(0, "idle"))
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
 def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
-    tmp_path.chmod(0o500)
-    with pytest.raises(RecordingError, match="Permission"):
-        BagWriter(tmp_path / "bag")
+    (tmp_path / "file").touch()
+    with pytest.raises(RecordingError, match="Not a directory"):
+        BagWriter(tmp_path / "file" / "bag")
 
 
 def _written_by(tmp_path, body, expect):
