@@ -86,38 +86,66 @@ class SensorNonlinearityBlock(MemorylessBlock):
         return InvertedCubic(self)
 
 
+FAR = 1e9
+"""Normalised position that no stage reaches [1]."""
+
+
+def turning_points(s2: float, s3: float) -> tuple[float, float]:
+    """The nearest x below and above zero at which x + s2 x² + s3 x³ turns; ∓`FAR` where it does not."""
+    square = s2 * s2 - 3.0 * s3
+    if square <= 0.0:
+        return -FAR, FAR
+    half = -(s2 + np.copysign(np.sqrt(square), s2))  # no cancellation
+    turns = [float(1.0 / half)]
+    if s3 != 0.0:
+        turns.append(float(half / (3.0 * s3)))
+    return max(x for x in (-FAR, *turns) if x < 0.0), min(x for x in (FAR, *turns) if x > 0.0)
+
+
 @kernel
-def cubic_root(y, s2, s3, x):
-    """x (n,) with x + s2 x² + s3 x³ = y (n,), on the branch through zero; its extremum if there is no solution."""
+def cubic_root(y, s2, s3, lower, upper, x):
+    """x (n,) with x + s2 x² + s3 x³ = y (n,) between the turning points; the nearer one if there is no solution."""
     for i in range(y.size):
-        root = y[i]
-        for _ in range(60):
+        low, high = (0.0, upper) if y[i] > 0.0 else (lower, 0.0)
+        root = min(max(y[i], 0.5 * low), 0.5 * high)
+        for _ in range(200):
+            off = y[i] - root - (s2 + s3 * root) * root * root
+            if off > 0.0:
+                low = root
+            else:
+                high = root
             slope = 1.0 + (2.0 * s2 + 3.0 * s3 * root) * root
-            if slope < 1e-3:
-                root *= 0.9
-                continue
-            change = (y[i] - root - (s2 + s3 * root) * root * root) / slope
-            root += change
+            after = root + off / slope if slope > 0.0 else high
+            if not low <= after <= high:
+                after = 0.5 * (low + high)
+            change, root = after - root, after
             if abs(change) <= 2e-16 * abs(root):
                 break
         x[i] = root
 
 
 CUBIC_ROOT = """\
-/* x with x + s2 x^2 + s3 x^3 = y, the one joined to zero; else the turning point. */
-static double cubic_root(double y, double s2, double s3)
+/* x with x + s2 x^2 + s3 x^3 = y between the turning points; the nearer one if there is none. */
+static double cubic_root(double y, double s2, double s3, double lower, double upper)
 {
-    double root = y;
+    double low = y > 0.0 ? 0.0 : lower, high = y > 0.0 ? upper : 0.0;
+    double root = smaller(larger(y, 0.5 * low), 0.5 * high);
     int k;
-    for (k = 0; k < 60; k++) {
+    for (k = 0; k < 200; k++) {
+        const double off = y - root - (s2 + s3 * root) * root * root;
         const double slope = 1.0 + (2.0 * s2 + 3.0 * s3 * root) * root;
-        double change;
-        if (slope < 1e-3) {
-            root *= 0.9;
-            continue;
+        double after, change;
+        if (off > 0.0) {
+            low = root;
+        } else {
+            high = root;
         }
-        change = (y - root - (s2 + s3 * root) * root * root) / slope;
-        root += change;
+        after = slope > 0.0 ? root + off / slope : high;
+        if (!(low <= after && after <= high)) {
+            after = 0.5 * (low + high);
+        }
+        change = after - root;
+        root = after;
         if (fabs(change) <= 2e-16 * fabs(root)) {
             break;
         }
@@ -133,12 +161,13 @@ class InvertedCubic(InvertedBlock):
 
     def __init__(self, block: SensorNonlinearityBlock) -> None:
         self.block = block
+        self.lower, self.upper = turning_points(block.s2, block.s3)
 
     def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
         x = np.empty_like(y)
-        cubic_root(y, self.block.s2, self.block.s3, x)
+        cubic_root(y, self.block.s2, self.block.s3, self.lower, self.upper, x)
         return x, None
 
     def c_form(self, ahead: int) -> CForm:
-        numbers = {"s2": self.block.s2, "s3": self.block.s3}
-        return CForm("return cubic_root(x, s2, s3);", "", numbers, (), (CUBIC_ROOT,))
+        numbers = {"s2": self.block.s2, "s3": self.block.s3, "lower": self.lower, "upper": self.upper}
+        return CForm("return cubic_root(x, s2, s3, lower, upper);", "", numbers, (), (CUBIC_ROOT,))
