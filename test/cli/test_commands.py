@@ -120,6 +120,23 @@ def test_report_writes_a_page_with_its_figures(piezo, identified, folder, tmp_pa
     assert (tmp_path / "page_figures" / "loops_by_amplitude.svg").exists()
 
 
+@pytest.mark.parametrize(
+    ("column", "factor", "status"), [("same", 1.02, 0), ("clipped", 1.0, 1), ("micrometres", 1e6, 1)]
+)
+def test_recalibrate_says_whether_its_model_can_be_trusted(piezo, identified, folder, tmp_path, column, factor, status):
+    (record,) = recording.read(folder / "04_triangle.npz")
+    u, y = record.voltage, factor * record.displacement
+    y = np.minimum(y, 0.9 * y.max()) if column == "clipped" else y
+    np.savez(tmp_path / "run.npz", voltage=u, displacement=y, sample_period=record.sample_period)
+    done = piezo("recalibrate", identified / "model.yaml", tmp_path / "run.npz", "-o", tmp_path / "new.yaml")
+    assert done.status == status
+    if column == "micrometres":
+        assert "check stage, columns and units" in done.err and done.err.count("\n") == 1
+    else:
+        verdict = done.out.splitlines()[-1]
+        assert verdict.startswith("Verdict: ") and ("doubtful" in verdict) == bool(status)
+
+
 def test_report_refuses_two_models_of_one_name(piezo, identified, folder, tmp_path):
     """The page would compare one model only, and name it twice."""
     for place in ("old", "new"):

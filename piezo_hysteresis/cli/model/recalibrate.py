@@ -21,6 +21,7 @@ import argparse
 from ...discrepancy.changes.recalibration import recalibrate
 from ...model import model_file
 from ...report.json_file import write_json
+from ...report.words import describes, error_sentence
 from ..options import reading_options
 from ..options.destination import add_results, require_new_results
 from ..terminal import console, show_notices
@@ -37,7 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fit the four numbers, print and save; returns 0.
+    """Fit the four numbers, print and save; returns 0, or 1 where model or data cannot be trusted.
 
     Raises
     ------
@@ -63,4 +64,7 @@ def run(args: argparse.Namespace) -> int:
     out.print(f"The free-run error was {found.before:.3g} % of the range before and is {found.after:.3g} % after.")
     show_notices(experiment.notices)
     out.print(f"wrote {path}")
-    return 0
+    severe = sum(notice.severe for notice in experiment.notices)
+    caveat = f" Severe findings in the data make this doubtful: {severe}, see above." if severe else ""
+    out.print(f"Verdict: {error_sentence(found.after)}{caveat}", style="bold")
+    return 0 if describes(found.after) and not severe else 1

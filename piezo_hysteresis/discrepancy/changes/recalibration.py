@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...effects import Offset
-from ...errors import IdentificationError
+from ...errors import IdentificationError, ParameterError
 from ...identification.fit.normal_equations import Nuisance, residuals
 from ...model.model import Model
 from ...model.provenance import provenance
@@ -81,7 +81,7 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     Raises
     ------
     IdentificationError
-        If the drive does not move in any record.
+        If the drive does not move in any record, or the changed parameters are beyond their bounds.
     ModelError
         If the records are faster than the model.
     """
@@ -95,7 +95,13 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     best = min((best, search.account("none", free=search.sides)), key=lambda account: account.cost)
     session = search.session(best)
     change = ParameterChange("delay", best.size, (best.size, best.size), (), best.cost, best.cost, session)
-    fitted = changed_model(model, change, records)
+    try:
+        fitted = changed_model(model, change, records)
+    except ParameterError as reason:
+        raise IdentificationError(
+            f"recalibrate: the gain would have to be {1.0 + session.get('gain', 0.0):.3g} times that of the model, "
+            f"which is beyond its bounds ({reason}); check stage, columns and units"
+        ) from None
 
     def error(candidate: Model) -> float:
         left = residuals(candidate, [records[i] for i in range(len(records))], Nuisance(offset=True))
