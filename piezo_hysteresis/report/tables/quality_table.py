@@ -26,7 +26,9 @@ from .table import Table
 
 _NOTE = (
     "Lag is the delay of the displacement at the turning points of the drive (in samples). It comes from the dynamics, "
-    "from a held drive (up to one sample), from creep in slow drives, or from a delayed channel."
+    "from a held drive (up to one sample), from creep in slow drives, or from a delayed channel. Creep and asymmetry "
+    "bend a slow loop, which then shows a lag or, with a minus sign, a lead of up to 1 % of the time between two "
+    "turning points."
 )
 """Explanation of the column of lags."""
 
