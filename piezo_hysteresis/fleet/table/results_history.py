@@ -27,7 +27,7 @@ from .results import read_results
 
 COLUMNS = [
     "recording", "task", "stage", "status", "verdict", "error", "recorded_at", "free_run_error_percent",
-    "floor_percent", "parameters",
+    "floor_percent", "severe_findings", "parameters",
 ]  # fmt: skip
 """Columns that the report needs."""
 
@@ -76,6 +76,7 @@ def results_history(folder: Path, task: str) -> FleetHistory:
         time=times,
         error=_numbers(rows, "free_run_error_percent"),
         floor=_numbers(rows, "floor_percent"),
+        severe=np.nan_to_num(_numbers(rows, "severe_findings")).astype(int),
         parameters={name: _series(parts) for name, parts in found.items()},
     )
 

@@ -82,6 +82,13 @@ def _sentences(
     if poor:
         named = ", ".join(f"{stage} ({count})" for stage, count in poor.most_common(5))
         yield f"Recordings with a larger error are most frequent at {named}; see piezo diagnose."
+    doubtful = np.flatnonzero(history.is_done & (history.severe > 0))
+    if doubtful.size:
+        first = history.recording[doubtful[0]]
+        yield (
+            f"Severe findings in the data make {doubtful.size} of these results doubtful, the first that of {first}; "
+            "the column `quality` of the table lists them."
+        )
     if outliers:
         names = list(dict.fromkeys(o.stage for o in outliers))
         first = f"the first in {outliers[0].parameter}"

@@ -68,6 +68,8 @@ class FleetHistory:
         Time of the recording; NaT if it is not known.
     error, floor : (n,) ndarray
         Free-run error and noise floor [% of range]; NaN if there is none.
+    severe : (n,) ndarray of int
+        Number of severe findings in the data.
     parameters : mapping of str to ParameterSeries
         Parameters by name; elements of arrays (``arx.a[0]``) are left out, because they are not identifiable.
     """
@@ -82,6 +84,7 @@ class FleetHistory:
     time: NDArray[np.datetime64]
     error: Array
     floor: Array
+    severe: NDArray[np.int_]
     parameters: Mapping[str, ParameterSeries]
 
     @property

@@ -49,6 +49,7 @@ def history(shift=0.0, lost=0, spread=0.02) -> FleetHistory:
         time=np.tile(np.array([f"2026-{m:02d}-03" for m in range(1, EACH + 1)], "datetime64[us]"), len(STAGES)),
         error=np.where(done, error, np.nan),
         floor=np.full(n, 0.03),
+        severe=np.zeros(n, int),
         parameters={
             "bouc_wen.A": ParameterSeries("1", index, value[index], value[index] - 0.004, value[index] + 0.004)
         },
@@ -106,6 +107,14 @@ def test_the_sentences_of_the_page_agree_with_the_numbers(tmp_path):
     assert by_stage["median_percent_of_range"][0] == pytest.approx(5.0, rel=0.2)
     page.save(tmp_path / "page.html")
     assert len(list((tmp_path / "page_figures").iterdir())) == 9
+
+
+def test_results_of_damaged_data_are_called_doubtful():
+    """A clipped recording may be described well, and wrongly."""
+    found = history()
+    assert "doubtful" not in fleet_page(found).html
+    found.severe[[3, 7]] = 1
+    assert f"make 2 of these results doubtful, the first that of {found.recording[3]}" in fleet_page(found).html
 
 
 def test_a_page_without_any_result_is_a_page():
