@@ -31,7 +31,7 @@ STAGE = Nanopositioner(mode=310.0, delay=2e-4, pole=2e-4)
 HIDDEN = {"hysteresis_memory", "level_dependent_memory", "creep", "even_input_polynomial", "extra_resonance"}
 
 
-def played(stage, frequencies, levels=(0.4, 0.7, 1.0)):
+def played(stage, frequencies, levels=(0.5, 1.0)):
     drives = ((f"sine_{f:g}hz", growing_sine(f, PERIOD, levels)) for f in frequencies)
     return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives))
 
