@@ -146,9 +146,8 @@ class Parameter:
         except (TypeError, ValueError):
             raise ParameterError(f"{name}: got {value!r}, expected a number [{self.unit}]") from None
         if not math.isfinite(number) or not self.lower <= number <= self.upper:
-            raise ParameterError(
-                f"{name}: got {number:g} {self.unit}, expected {self.lower:g} to {self.upper:g} {self.unit}"
-            )
+            unit = "" if self.unit == "1" else f" {self.unit}"
+            raise ParameterError(f"{name}: got {number:g}{unit}, expected {self.lower:g} to {self.upper:g}{unit}")
         return number
 
 

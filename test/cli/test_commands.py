@@ -137,6 +137,18 @@ def test_recalibrate_says_whether_its_model_can_be_trusted(piezo, identified, fo
         assert verdict.startswith("Verdict: ") and ("doubtful" in verdict) == bool(status)
 
 
+@pytest.mark.parametrize(
+    "answer",
+    [{"schema": 1, "percent_of_range": 0.1}, {"schema": 1, "verdict": "named", "effects": [{"name": "creep"}]}],
+)
+def test_report_refuses_what_is_no_answer_of_a_diagnosis(piezo, identified, folder, tmp_path, answer):
+    (tmp_path / "answer.json").write_text(json.dumps(answer))
+    words = ("--model", identified / "model.yaml", "--answer", tmp_path / "answer.json", "-o", tmp_path / "page.html")
+    done = piezo("report", folder, *words)
+    assert done.status == 2 and done.err.count("\n") == 1
+    assert "answer.json" in done.err and "expected the answer of `piezo diagnose --json`" in done.err
+
+
 def test_report_refuses_two_models_of_one_name(piezo, identified, folder, tmp_path):
     """The page would compare one model only, and name it twice."""
     for place in ("old", "new"):

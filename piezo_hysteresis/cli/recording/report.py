@@ -18,13 +18,16 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from ...discrepancy.residual.residual import zero_per_phase
-from ...errors import ParameterError
+from ...errors import ParameterError, RecordingError
 from ...model import model_file
 from ...report.figures.comparison import compare
 from ...report.json_file import read_json
 from ...report.page import page
+from ...report.tables.answer_tables import correction_table, effect_table, gap_table, rejection_table, where_table
+from ...report.verdict import answer_verdict
 from ..options import reading_options
 from ..options.destination import add_force, require_new_results
 from ..terminal import console, progress
@@ -69,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         if label in models:
             raise ParameterError(f"--model: got two models called '{label}', expected LABEL=FILE with different labels")
         models[label] = model_file.load(path)
-    answer = None if args.answer is None else read_json(args.answer)
+    answer = None if args.answer is None else _answer(args.answer)
     experiment = reading_options.read(args)
     nuisances = None if args.one_zero else {label: zero_per_phase(model) for label, model in models.items()}
     with progress("report") as report_progress:
@@ -78,3 +81,18 @@ def run(args: argparse.Namespace) -> int:
     drawn.save(path)
     console().print(f"wrote {path} and {len(drawn.drawings)} figures beside it")
     return 0
+
+
+def _answer(path: str) -> dict[str, Any]:
+    """The answer of a diagnosis, whose parts are tried before anything is drawn."""
+    answer = read_json(path)
+    if missing := [key for key in ("schema", "verdict", "effects") if key not in answer]:
+        raise RecordingError(f"{path}: got no '{missing[0]}', expected the answer of `piezo diagnose --json`")
+    try:
+        answer_verdict(answer)
+        for table in (effect_table, correction_table, where_table, gap_table, rejection_table):
+            table(answer)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise RecordingError(f"{path}: damaged ({reason}), expected the answer of `piezo diagnose --json`") from None
+    return answer
