@@ -27,11 +27,12 @@ from ...model import axes_file
 from ...record import Experiment, Record
 from ...report.json_file import write_json
 from ...report.tables.table import Table
+from ...report.words import describes, error_sentence
 from ..terminal import console, show, show_notices
 
 
 def identify(experiment: Experiment, args: argparse.Namespace) -> int:
-    """Fit a model of several axes, print its errors and save it; returns 0.
+    """Fit a model of several axes, print its errors and save it; returns 0, or 1 where it cannot be trusted.
 
     Raises
     ------
@@ -47,14 +48,15 @@ def identify(experiment: Experiment, args: argparse.Namespace) -> int:
         raise IdentificationError("every phase is held out, expected at least one to fit")
     model = identify_axes(fitted, length=LENGTH if args.taps is None else args.taps)
     axes_file.save(model, path)
-    _show(axes_errors(model, judges or fitted), "not fitted" if judges else "fitted", args.json)
+    errors = axes_errors(model, judges or fitted)
+    _show(errors, "not fitted" if judges else "fitted", args.json)
     show_notices(experiment.notices)
     console().print(f"wrote {path}")
-    return 0
+    return _verdict(errors, experiment)
 
 
 def validate(experiment: Experiment, args: argparse.Namespace) -> int:
-    """Print the free-run errors of a model of several axes; returns 0.
+    """Print the free-run errors of a model of several axes; returns 0, or 1 where model or data cannot be trusted.
 
     Raises
     ------
@@ -62,9 +64,19 @@ def validate(experiment: Experiment, args: argparse.Namespace) -> int:
         If the model or the records cannot be used, or do not fit each other.
     """
     records: Sequence[Record] = experiment.records
-    _show(axes_errors(axes_file.load(args.model), records), "", args.json)
+    errors = axes_errors(axes_file.load(args.model), records)
+    _show(errors, "", args.json)
     show_notices(experiment.notices)
-    return 0
+    return _verdict(errors, experiment)
+
+
+def _verdict(errors: Sequence[AxisError], experiment: Experiment) -> int:
+    """Print the result in one sentence, from the largest error; returns the exit status."""
+    largest = max(error.percent for error in errors)
+    severe = sum(notice.severe for notice in experiment.notices)
+    caveat = f" Severe findings in the data make this doubtful: {severe}, see above." if severe else ""
+    console().print(f"Verdict, from the largest error: {error_sentence(largest)}{caveat}", style="bold")
+    return 0 if describes(largest) and not severe else 1
 
 
 def _show(errors: Sequence[AxisError], data: str, json: str | None) -> None:
