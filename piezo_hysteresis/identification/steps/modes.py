@@ -43,6 +43,8 @@ SAMPLES = 60_000
 """Largest number of samples that are fitted."""
 SIMULATIONS, CONVERGED = 20, 1e-3
 """Largest number of simulations of a fit, and relative decrease of the squared error at convergence."""
+FAST = 0.1
+"""Absolute value of the poles with which a section begins that no mode was found for."""
 INDEPENDENT = 1e-13
 """Smallest eigenvalue of a determined direction, relative to the largest one."""
 AWAY = 1e3
@@ -121,9 +123,12 @@ def _found_at(
     modes = poles[poles.imag > 0.0] ** (1.0 / factor)
     if not modes.size:
         raise IdentificationError(f"modes: got none at a rate lower by {factor}, expected a pair of poles")
-    sections = np.zeros((orders[0] // 2, 2))  # only modes are used, because slow real poles would imitate creep
-    sections[: modes.size] = np.column_stack((-2.0 * modes.real, np.abs(modes) ** 2))
-    return sections
+    # only modes are used, because slow real poles would imitate creep; the other sections are fast and differ, because
+    # equal ones have equal slopes, and would stay equal
+    others = orders[0] // 2 - modes.size
+    fast = FAST * np.exp(1j * np.pi * np.arange(1, others + 1) / (others + 1))
+    both = np.concatenate((modes, fast))
+    return np.column_stack((-2.0 * both.real, np.abs(both) ** 2))
 
 
 def _projected(sections: Array, signals: Signals) -> tuple[Array, Array, Array]:
@@ -174,9 +179,8 @@ def _fitted(sections: Array, signals: Signals) -> tuple[Array, Array]:
         inverse = np.linalg.pinv(basis @ basis.T, rcond=INDEPENDENT, hermitian=True)
         return np.asarray((along @ basis.T @ inverse @ basis - along).T)
 
-    # not "lm": where sections are equal, the first step of SciPy 1.17 depends on what the memory contained before
     fitted = scipy.optimize.least_squares(
-        residual, sections.ravel(), slopes, method="trf", x_scale="jac", ftol=CONVERGED, max_nfev=SIMULATIONS
+        residual, sections.ravel(), slopes, method="lm", x_scale="jac", ftol=CONVERGED, max_nfev=SIMULATIONS
     )
     return fitted.x.reshape(-1, 2), projected(tuple(fitted.x))[0]
 
