@@ -48,8 +48,8 @@ def test_hum_is_explained_in_the_recordings_and_not_predicted_live():
     found = diagnose(HUM.experiment())
     check_agreement(found)
     assert found.verdict is Verdict.NAMED
-    assert found.names[0] == "mains_hum"
-    assert set(found.names) <= {"mains_hum", "amplifier_bandwidth"}  # this stage has an amplifier of 10 kHz
+    # the amplifier of this stage has a time constant below one sample, which the dynamics can contain
+    assert found.names == ("mains_hum",)
     assert found.gap.after < 1.3 * found.gap.floor
     assert found.gap.live > 0.5 * found.gap.before
 

@@ -38,6 +38,8 @@ from .execution.cores import on_cores
 from .execution.time_limit import check_time
 from .training_data import TrainingData
 
+LINEAR = ("lag", "dynamics")
+"""Families of effects that dynamics of sufficient order can contain."""
 TOLERANCE = 1e-3
 """Relative decrease of the cost at convergence of a refit."""
 LAST, PRECISE = 25, 1e-4
@@ -188,10 +190,33 @@ def _behind_anew(
 def without(candidate: FittedCandidate, max_iterations: int) -> Fitted | None:
     """The candidate's model refitted without its effect; None if this diverges.
 
-    The gain of this model over the model before is due to dynamics and hysteresis, and not to the effect.
+    The gain of this model over the model before is due to dynamics and hysteresis, and not to the effect. An effect
+    that the dynamics can contain is no missing effect, although a joint fit may have stopped before they contained it.
     """
+    model = candidate.fit.model.without(candidate.name)
     training_data = candidate.training_data.without(candidate.name)
-    with suppress(*FAILURES):
-        model = joint(candidate.fit.model.without(candidate.name), training_data, max_iterations).model
-        return Fitted(model, score_model(model, training_data))
+    starts = [model]
+    if (
+        candidate.effect.family in LINEAR
+        and (found := _absorbed(model, candidate.fit.model, training_data)) is not None
+    ):
+        starts.append(found)
+    fits = list[Fitted]()
+    for start in starts:
+        with suppress(*FAILURES):
+            fitted = joint(start, training_data, max_iterations).model
+            fits.append(Fitted(fitted, score_model(fitted, training_data)))
+    return min(fits, key=lambda f: f.score.cost, default=None)
+
+
+def _absorbed(model: Model, extended: Model, training_data: TrainingData) -> Model | None:
+    """The model with dynamics that imitate `extended`, which has one more linear effect; None if there are none."""
+    broadband = training_data.broadband()
+    if not broadband or not isinstance(model[Arx.name], Arx):
+        return None
+    inputs = hysteresis_signals(model, training_data.records, broadband)
+    outputs = extended.free_run(training_data.records)
+    signals = [(w, outputs[i] / model.displacement_scale) for (w, _), i in zip(inputs, broadband, strict=True)]
+    with suppress(IdentificationError, ParameterError, DivergenceError):
+        return with_dynamics(model, identify_arx(signals, *form_of(model), ITERATIONS).arx)
     return None

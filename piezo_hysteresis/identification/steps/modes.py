@@ -43,7 +43,7 @@ SAMPLES = 60_000
 """Largest number of samples that are fitted."""
 SIMULATIONS, CONVERGED = 20, 1e-3
 """Largest number of simulations of a fit, and relative decrease of the squared error at convergence."""
-FAST = 0.1
+FAST = 0.3
 """Absolute value of the poles with which a section begins that no mode was found for."""
 INDEPENDENT = 1e-13
 """Smallest eigenvalue of a determined direction, relative to the largest one."""
