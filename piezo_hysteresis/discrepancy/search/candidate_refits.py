@@ -155,6 +155,16 @@ def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
 
 
 def simplest(refits: list[FittedCandidate]) -> FittedCandidate:
-    """The refit with the fewest parameters among those that are as good as the best."""
-    ties = [c for c in refits if c.score.cost - refits[0].score.cost < TIE]
-    return min(ties, key=lambda c: (len(c.fit.names), c.score.cost))
+    """The refit with the fewest parameters among those that are as good as the best.
+
+    A further number of a law must be visible: if another law of the effect reaches the floor, the gain over it has to
+    exceed two standard errors.
+    """
+    best = refits[0]
+
+    def is_tie(candidate: FittedCandidate) -> bool:
+        lead, error = best.score.better_than(candidate.score)
+        is_law = candidate.effect.public_name() == best.effect.public_name() and candidate.score.excess <= ADEQUATE
+        return lead < TIE or (is_law and lead < 2.0 * error)
+
+    return min(filter(is_tie, refits), key=lambda c: (len(c.fit.names), c.score.cost))
