@@ -14,15 +14,18 @@
 
 """What counts as an effect once it has been fitted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy.search.acceptance_tests import bends_all_along, first_rejection
+from piezo_hysteresis.discrepancy.search.candidate_refits import simplest
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.cross_validation import Score
 from piezo_hysteresis.discrepancy.search.refit import Fitted
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
-from piezo_hysteresis.effects import AmplifierSaturation, BoucWen, GainDrift
+from piezo_hysteresis.effects import AmplifierSaturation, BoucWen, Creep, CreepFractional, GainDrift
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
@@ -50,3 +53,17 @@ def test_an_effect_must_gain_over_the_model_that_was_refitted_without_it():
 def test_a_limit_whose_bend_is_wider_than_the_drive_is_a_curve(corner, curve):
     saturation = AmplifierSaturation(upper=9.0, corner=corner)
     assert bends_all_along(fitted(saturation, (), np.empty((0, 0)))) is curve
+
+
+@pytest.mark.parametrize(
+    ("simple", "others", "law"),
+    [(1.15, 1.0, "creep"), (1.15, 1.15, "creep_fractional"), (5.0, 1.0, "creep_fractional")],
+    ids=["one record", "all records", "above the floor"],
+)
+def test_a_law_with_one_number_more_must_gain_visibly_over_one_that_reaches_the_floor(simple, others, law):
+    names = ("creep_fractional.gamma", "creep_fractional.exponent")
+    best = fitted(CreepFractional(gamma=0.01, exponent=0.05), names, np.eye(2))
+    best = replace(best, score=Score(np.ones(10), np.zeros(2)))
+    simpler = fitted(Creep(gamma=0.01), ("creep.gamma",), np.eye(1))
+    simpler = replace(simpler, score=Score(np.array([simple, *[others] * 9]), np.zeros(1)))
+    assert simplest([best, simpler]).name == law
