@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +27,7 @@ from ...identification.protocol.protocol import Protocol, ProtocolPhase
 from ..runtime.guarded_node import GuardedNode
 from .bag_recorder import BagRecorder
 from .driver_client import DriverClient
+from .wait_limit import WaitLimit
 
 T = TypeVar("T")
 """Type of the value that a wait returns."""
@@ -189,9 +189,9 @@ def _all_phases(driver: DriverClient, recorder: BagRecorder, protocol: Protocol,
 
 def _until(wanted: Callable[[], T | None], missing: Callable[[], str]) -> Generator[Progress, None, T]:
     """Wait until `wanted` returns something true, and return that."""
-    deadline = time.monotonic() + PATIENCE
+    limit = WaitLimit(PATIENCE)
     while not (found := wanted()):
-        if time.monotonic() > deadline:
+        if limit.has_passed():
             raise StageError(f"waited {PATIENCE:g} s, but did not find {missing()}")
         yield Progress("waiting", f"for {missing()}")
     return found
@@ -206,12 +206,12 @@ def _require_claim(driver: DriverClient) -> None:
 
 def _go_to_start(driver: DriverClient, phase: ProtocolPhase, progress: Progress) -> Generator[Progress]:
     """Wait for new messages of 'voltage' before a phase is sent, because the known voltage may be outdated."""
-    seen, deadline = driver.voltages, time.monotonic() + _SETTLING
+    seen, limit = driver.voltages, WaitLimit(_SETTLING)
     while True:
         reason = driver.misplaced(float(phase.voltage[0]))
         if not reason and driver.voltages >= seen + _NEWER:
             return
-        if time.monotonic() > deadline:
+        if limit.has_passed():
             why = f"{reason}; another program has moved the stage" if reason else "no message arrives on 'voltage'"
             raise StageError(f"phase '{phase.name}': {why}")
         yield progress
@@ -222,12 +222,11 @@ def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, pro
     driver.send(phase)
     # a device that plays from its memory sends nothing before the end
     longest_silence = PATIENCE + 2.0 * phase.duration
-    deadline = time.monotonic() + PATIENCE
-    played: float | None = None
+    answer, end = WaitLimit(PATIENCE), WaitLimit(PATIENCE)
     while driver.state != "done":
         if driver.state in ("refused", "stopped"):
             raise StageError(f"phase '{phase.name}' was {driver.state}: {driver.reason}")
-        if driver.state in ("sending", "sent") and time.monotonic() > deadline:
+        if driver.state in ("sending", "sent") and answer.has_passed():
             raise StageError(f"phase '{phase.name}': no answer on 'command_status' within {PATIENCE:g} s")
         if driver.limits is None:
             raise StageError(
@@ -236,9 +235,8 @@ def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, pro
         _require_claim(driver)
         if recorder.silence > longest_silence:
             raise StageError(f"phase '{phase.name}': no samples for {longest_silence:g} s; is the driver alive?")
-        if played is None and driver.state == "playing" and recorder.holds(driver.first_index + phase.voltage.size):
-            played = time.monotonic()
-        if played is not None and time.monotonic() > played + PATIENCE:
+        is_played = driver.state == "playing" and recorder.holds(driver.first_index + phase.voltage.size)
+        if is_played and end.has_passed():
             raise StageError(
                 f"phase '{phase.name}' was played, but the driver did not report its end; check whether "
                 "others send many commands"
