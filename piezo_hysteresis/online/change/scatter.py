@@ -30,11 +30,20 @@ Array = NDArray[np.float64]
 DISTINCT = 1e-6
 """A group counts as excited if at least this share of its sensitivity remains after its mean was subtracted."""
 
+SIGNIFICANT = 3.0
+"""Smallest mean of a score, in standard errors, that counts as a systematic error of the model."""
+
+BATCHES = 10
+"""Number of successive parts of a baseline whose means give the standard error of the mean; scores are correlated."""
+
 SLOWEST_DECAY = 0.98
 """Largest ratio between the correlations of scores at successive lags; it is a correlation time of 5 s."""
 
 FEWEST_WINDOWS = 4
 """Fewest windows of `WINDOW` scores of one class from which a drift of the misfit is estimated."""
+
+SMALLEST = 1e-10
+"""Eigenvalues below this share of the largest count as zero."""
 
 SMALLEST_ROOT = 1e-5
 """Eigenvectors of a slope are ignored if the root of their eigenvalue is below this share of the largest root."""
@@ -116,9 +125,7 @@ class Scatter:
         scale, offset = _scale(slope), GROUPS.index("offset")
         apart = np.diag(slope) - slope[:, offset] ** 2 / slope[offset, offset]
         kept = np.flatnonzero((apart > DISTINCT**2 * np.diag(slope)) | (np.arange(len(GROUPS)) == offset))
-        misfit = np.zeros(len(GROUPS))
-        inner = np.linalg.pinv((slope / scale[:, None] / scale)[np.ix_(kept, kept)], rcond=1e-10, hermitian=True)
-        misfit[kept] = inner @ (np.mean([s.value for s in scores], axis=0) / scale)[kept] / scale[kept]
+        misfit = _misfit(np.array([s.value for s in scores]), slope, kept)
         covariance = _even_covariance(scores, misfit, scale, kept)
         precision = np.zeros_like(slope)
         biased = (len(scores) - kept.size - 2) / (len(scores) - 1)  # mean of the inverse of a Wishart matrix
@@ -139,6 +146,28 @@ def residual_power(scores: Sequence[ChangeScore]) -> float:
 def _scale(slope: Array) -> Array:
     size = np.sqrt(np.diag(slope))
     return np.where(size > 0.0, size, 1.0)
+
+
+def _misfit(values: Array, slope: Array, kept: NDArray[np.intp]) -> Array:
+    """`Scatter.misfit` of the scores `values` (n, 5).
+
+    It holds the offset, and what the scores show of the other groups beside it. A direction whose mean is not
+    significant has no misfit: divided by a small slope, its error would be a large misfit that other groups cancel, and
+    the sum would count as a change as soon as the slopes are different.
+    """
+    scale, offset = _scale(slope), GROUPS.index("offset")
+    others = kept[kept != offset]
+    inner, scores = slope / scale[:, None] / scale, values / scale
+    common = inner[others, offset] / inner[offset, offset]
+    strengths, directions = np.linalg.eigh(inner[np.ix_(others, others)] - np.outer(common, inner[offset, others]))
+    along = (scores[:, others] - np.outer(scores[:, offset], common)) @ directions
+    means = np.array([part.mean(axis=0) for part in np.array_split(along, BATCHES)])
+    error = means.std(axis=0, ddof=1) / np.sqrt(BATCHES)
+    seen = (np.abs(along.mean(axis=0)) > SIGNIFICANT * error) & (strengths > SMALLEST * strengths.max(initial=_TINY))
+    misfit = np.zeros(len(GROUPS))
+    misfit[others] = directions[:, seen] @ (along.mean(axis=0)[seen] / strengths[seen])
+    misfit[offset] = (scores[:, offset].mean() - inner[offset] @ misfit) / inner[offset, offset]
+    return misfit / scale
 
 
 def _roots(slope: Array, scale: Array, kept: NDArray[np.intp]) -> tuple[Array, Array]:

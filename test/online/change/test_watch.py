@@ -149,6 +149,28 @@ def test_a_misfit_in_the_baseline_is_not_a_change(drive):
     assert watch.alarms == 0
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_recalibrated_model_raises_no_alarm_at_whatever_moment_it_is_used(seed):
+    """Its sensitivities begin at another phase of the drive than those of the baseline."""
+    u = sine(85.0)
+    measured = run(MODEL, u) + 5e-4 * SPAN * np.random.default_rng(seed).standard_normal(u.size)
+    new = MODEL.with_values({"bouc_wen.A": (1.0 + 1e-7) * MODEL.values()["bouc_wen.A"]})
+    predictor, watch = Predictor(PERIOD, MODEL), ChangeWatch(3600.0)
+    largest = 0.0
+    for first in range(0, u.size - BLOCK + 1, BLOCK):
+        part = slice(first, first + BLOCK)
+        if first == BLOCK * 10:
+            watch.take_baseline(20.0)
+        elif first == BLOCK * (360 + 13 * seed):
+            watch.baseline = watch.baseline.of_model(model_hash(new))
+            predictor.swap(new, predictor.offset)
+        answer = predictor.predict(first, round(first * PERIOD * 1e9), u[part], measured[part])
+        watch.add(u[part], answer, predictor, round((first + BLOCK) * PERIOD * 1e9))
+        largest = max(largest, watch.change.statistic)
+    assert watch.alarms == 0
+    assert largest > 0.0
+
+
 def test_another_drive_than_those_of_the_baseline_is_not_watched(drive):
     watch, _ = follow(drive, run(MODEL, drive))
     other = sine(8.0, frequency=40.0, amplitude=0.1)
