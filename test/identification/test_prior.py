@@ -35,7 +35,7 @@ from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.steps.remaining_lag import lag
 from piezo_hysteresis.identification.structure.piece_fit import linearised
 from piezo_hysteresis.identification.structure.pieces import pieces_of
-from piezo_hysteresis.identification.structure.prior import WANDER, WANDER_TIME, WAVES, prior_of, slow_rows
+from piezo_hysteresis.identification.structure.prior import CREEP, WANDER, WANDER_TIME, WAVES, prior_of, slow_rows
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment
 
@@ -85,7 +85,7 @@ def test_smooth_weights_and_one_rate_have_no_cost_and_others_have():
             HysteresisMemory(c=tuple(smooth.tolist())),
             LevelDependentMemory(),
             EvenInputPolynomial(),
-            CreepTwoRates(gamma_fast=0.01, gamma_slow=0.01),
+            CreepTwoRates(gamma_fast=CREEP, gamma_slow=CREEP),
             Arx(b=(1.0,)),
         ),
         PERIOD,
@@ -97,7 +97,7 @@ def test_smooth_weights_and_one_rate_have_no_cost_and_others_have():
 
     assert cost(model) < 0.01
     spike = model.with_values({"hysteresis_memory.c[0]": 0.08})
-    two = model.with_values({"creep_two_rates.gamma_fast": 0.0, "creep_two_rates.gamma_slow": 0.02})
+    two = model.with_values({"creep_two_rates.gamma_fast": CREEP - 0.01, "creep_two_rates.gamma_slow": CREEP + 0.01})
     bent = model.with_values({"level_dependent_memory.k_narrow": 0.5})
     curved = model.with_values({"bouc_wen.p1": 0.5, "even_input_polynomial.p_e": -0.5})
     assert min(cost(spike), cost(two), cost(bent), cost(curved)) > 0.3

@@ -132,7 +132,7 @@ def linearised(
     slow = slow_rows(pieces, model.displacement_scale)
     found = grams(model, [p.record for p in pieces], names, None, slow)
     counted = [i for i, p in enumerate(pieces) if WEIGHTS[p.kind] > 0.0]
-    weights = np.array([WEIGHTS[pieces[i].kind] for i in counted])
+    weights = np.array([pieces[i].weight for i in counted])
     for origin in {pieces[i].origin for i in counted}:
         mine = np.array([pieces[i].origin == origin for i in counted])
         weights[mine] /= weights[mine].sum()

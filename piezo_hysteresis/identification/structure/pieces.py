@@ -61,7 +61,7 @@ class Kind(StrEnum):
 
 
 WEIGHTS = {Kind.STEP: 0.1, Kind.HOLD: 0.5, Kind.LOOP: 1.0, Kind.CONDITIONING: 0.0}
-"""Weight in a fit, so that a ringing mode does not outweigh the creep after it, nor one level all loops."""
+"""Usual weight in a fit, so that a ringing mode does not outweigh the creep after it, nor one level all loops."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -82,6 +82,8 @@ class RecordPiece:
         Class of the amplitude, for loops.
     run : int
         Number of the run of records that continue one another; they share a sensor zero.
+    share : float
+        Share of the usual weight of its kind that it has in a fit, 0 to 1.
     """
 
     record: Record
@@ -90,6 +92,12 @@ class RecordPiece:
     rate: int = 0
     amplitude: int = 0
     run: int = 0
+    share: float = 1.0
+
+    @property
+    def weight(self) -> float:
+        """Weight in a fit, relative to the other pieces of the record."""
+        return WEIGHTS[self.kind] * self.share
 
 
 _Edge = tuple[int, Kind, int, int]

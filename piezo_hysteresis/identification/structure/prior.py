@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Prior knowledge of a stage: its zero wanders, its creep has about one rate, the weights of its plays are smooth.
+"""Prior knowledge of a stage: its zero wanders, it creeps at about one rate, the weights of its plays are smooth.
 
 All priors are Gaussian and enter the normal equations of a fit. Without them, any slow motion within one record would
 be fitted as slow creep, which reduces fast creep to zero and predicts motion that does not occur; and a single play
@@ -26,7 +26,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import MEMORY, CreepTwoRates, EvenInputPolynomial
+from ...effects import MEMORY, Creep, CreepTwoRates, EvenInputPolynomial
 from ...model.model import Model
 from .pieces import RecordPiece
 
@@ -38,6 +38,8 @@ WANDER_TIME = 10.0
 """Time of that wander [s]; its variance grows with the time."""
 WAVES = 6
 """Number of waves for the wander of a run of records (Karhunen-Loève expansion of a random walk)."""
+CREEP, CREEP_SPREAD = 0.0125, 0.0075
+"""Creep of a usual piezo ceramic, and its standard deviation [1/decade]; motion at one rate hardly determines it."""
 ONE_RATE = 0.005
 """Standard deviation of the difference between fast and slow creep [1/decade]."""
 SMOOTH = 0.1
@@ -102,6 +104,8 @@ def prior_of(model: Model, names: Sequence[str], slow: int) -> Array:
     fast, late = (f"{CreepTwoRates.name}.{n}" for n in ("gamma_fast", "gamma_slow"))
     if fast in names and late in names:
         rows.append(_row(model, names, [(fast, 1.0), (late, -1.0)], ONE_RATE, slow))
+    creeps = [n for n in (fast, late, f"{Creep.name}.gamma") if n in names]
+    rows += [_row(model, names, [(n, 1.0)], CREEP_SPREAD, slow, CREEP) for n in creeps]
     if MEMORY.name in model and f"{MEMORY.name}.c[0]" in names:
         count = model[MEMORY.name].array("c").size
         weights = [f"{MEMORY.name}.c[{j}]" for j in range(count)]
@@ -118,9 +122,17 @@ def prior_of(model: Model, names: Sequence[str], slow: int) -> Array:
     return np.asarray(whole.T @ whole / INDEPENDENT)
 
 
-def _row(model: Model, names: Sequence[str], terms: Sequence[tuple[str, float]], sigma: float, slow: int) -> Array:
-    """A sum of parameters that is zero within `sigma`, linearised at the model: (1, q + slow + 1)."""
+def _row(
+    model: Model,
+    names: Sequence[str],
+    terms: Sequence[tuple[str, float]],
+    sigma: float,
+    slow: int,
+    usual: float = 0.0,
+) -> Array:
+    """A sum of parameters that is `usual` within `sigma`, linearised at the model: (1, q + slow + 1)."""
     row = np.zeros((1, len(names) + slow + 1))
+    row[0, -1] = usual
     values = model.values()
     for name, factor in terms:
         row[0, names.index(name)] = factor

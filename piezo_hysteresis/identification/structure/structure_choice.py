@@ -46,6 +46,7 @@ from .linear_part import fit_linear_part, fit_structure, held_by, mode_notices
 from .piece_fit import PieceFit
 from .pieces import Kind, RecordPiece, pieces_of
 from .scores import STRUCTURES, Judged, ModelStructure, judge
+from .step_weights import discounted_steps
 from .uncertainty import as_fit, spread_of
 
 PLAYS = 16
@@ -54,6 +55,8 @@ WIDEST = 0.94
 """Half width of the widest play, as a share of the largest drive; a play at rest moves once the drive exceeds it."""
 START_CREEP = 0.005
 """Creep per decade of time at which a fit starts."""
+DISCOUNTS = 2
+"""Number of times that the weights of steps are adapted to their misfit; the first fit takes part of it up."""
 TIE = 0.02
 """Difference of scores (mean ln R²) within which the structure with fewer parameters is chosen."""
 CREEPS = (Creep.name, CreepTwoRates.name)
@@ -113,6 +116,11 @@ def choose_structure(
     plain, ringing = fit_linear_part(_with_plays(start, used), pieces, sizes)
     progress("structure: effects", 0.4)
     held = held_by(plain)
+    for _ in range(DISCOUNTS):
+        pieces = discounted_steps(pieces, plain)
+        if all(p.share == 1.0 for p in pieces):
+            break
+        plain = fit_structure(plain.model, pieces, sizes, held)
     full = fit_structure(plain.model.with_effect(MEMORY.level_term()), pieces, sizes, held)
     judged = sorted(judge(full, pieces, _offered(pieces)), key=lambda j: j.score)
     best = judged[0]
