@@ -28,22 +28,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.block import Block, State
-from ...blocks.bouc_wen_kernel import (
-    BETA,
-    EXPONENT,
-    GAMMA,
-    H_REFERENCE,
-    PHI1,
-    PHI2,
-    RATE,
-    RATE_EXPONENT,
-    A,
-    rate_factor,
-)
-from ...blocks.kernel import kernel
-from ...effects import BoucWen, Discretisation, Effect
-from ...effects.hysteresis.bouc_wen import BoucWenBlock
+from ...effects import BoucWen
+from ...effects.hysteresis.explicit_bouc_wen import ExplicitBoucWen
 from ...identification.fit.normal_equations import grams
 from ...model.model import Model
 from ...record import Experiment, Notice, Record
@@ -67,42 +53,6 @@ TURNS = 4
 """Largest number of iterations."""
 LINEARISATIONS, PRECISE = 9, 1e-3
 """Largest number of linearisations of a fit, and relative decrease of the cost at convergence."""
-
-
-@kernel
-def run_explicit(v: Array, p: Array, p1: float, p2: float, sample_period: float, state: Array, w: Array) -> None:
-    """The loop with all its terms, one explicit step per sample; arguments as `run_general`."""
-    h, last = state[0], state[1]
-    for i in range(v.size):
-        x = v[i]
-        dv = x - last
-        if dv != 0.0:
-            last = x
-            size = abs(dv)
-            gain = 1.0
-            if p[RATE] != 0.0:
-                gain += p[RATE] * rate_factor(size / sample_period, p[RATE_EXPONENT])
-            power = abs(h / H_REFERENCE) ** (p[EXPONENT] - 1.0) if p[EXPONENT] != 1.0 else 1.0
-            loss = power * (p[BETA] * size * h + p[GAMMA] * dv * abs(h))
-            h += gain * p[A] * dv - loss + p[PHI1] * dv * h + p[PHI2] * size * abs(h)
-        w[i] = p1 * x * x * x + p2 * x + h
-    state[0], state[1] = h, last
-
-
-class ExplicitBoucWen(BoucWen):
-    """The loop of `BoucWen` with its terms, integrated by the explicit step."""
-
-    def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
-        return ExplicitBlock(self, setting, terms)
-
-
-class ExplicitBlock(BoucWenBlock):
-    """Only for simulation: its sensitivities are those of the exact step."""
-
-    def run(self, x: Array, state: State) -> tuple[Array, State]:
-        w, state = np.empty_like(x), state.copy()
-        run_explicit(x, self.loop, self.p1, self.p2, self.sample_period, state, w)
-        return w, state
 
 
 def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
