@@ -33,7 +33,7 @@ from .search.refit import LAST, PRECISE, joint, restart
 from .search.selection_result import Selection
 from .search.training_data import TrainingData
 from .unnamed.offer import best_correction
-from .verdict import conclusion_of, is_explained, is_substitute
+from .verdict import conclusion_of, is_explained
 
 NOISY, WORTHWHILE = 1.1, 0.95
 """Ratio of the cost to the cost of noise above which the last fit is restarted, and largest ratio of the new cost to
@@ -64,7 +64,7 @@ def concluded(
     """
     records, least, training_data = setup.records, setup.least, setup.training_data
     progress("gap", 0.85)
-    named = is_explained(selection) and not is_substitute(selection)
+    named = is_explained(selection)
     whole = setup.whole
     plain = selection.baseline if selection.accepted else selection.model  # the search may have found better dynamics
     first = joint(plain, replace(training_data, records=whole), LAST, PRECISE)

@@ -20,7 +20,6 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..effects import ExtraResonance
 from ..identification.fit.form_uncertainty import ADEQUACY
 from .gap import Gap
 from .search.cross_validation import ADEQUATE
@@ -36,8 +35,6 @@ NAMED, NAMED_FAR = 0.6, 0.75
 """Smallest explained fraction of the gap for a name, and the same if the remaining error is large."""
 FAR = 10.0
 """V above which the remaining error is large: a similar effect of another family may explain as much of the gap."""
-LINEAR_LEAVES = 2.0 * ADEQUATE
-"""Largest V that a linear effect may leave. The dynamics are fitted together with it and explain the rest."""
 
 
 class Verdict(StrEnum):
@@ -85,12 +82,6 @@ def is_explained(selection: Selection) -> bool:
     """Whether the added effects explain enough of the gap for a name."""
     share = NAMED if selection.score.excess <= FAR else NAMED_FAR
     return bool(selection.accepted) and selection.explained(selection.score) >= share
-
-
-def is_substitute(selection: Selection) -> bool:
-    """Whether an added lag or resonance leaves a gap. A real one leaves none, so this one replaces other dynamics."""
-    linear = any(s.best.effect.family == "lag" or s.best.name == ExtraResonance.name for s in selection.accepted)
-    return linear and selection.score.excess > LINEAR_LEAVES
 
 
 def not_predicted_live(name: str, live: float) -> str:
@@ -144,12 +135,6 @@ def conclusion_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> t
             Conclusion.NOTHING_MISSING,
             f"No effect is missing: the error is at the noise floor (at least {100 * ADEQUACY:g} % of the range).",
         )
-    if is_explained(selection) and is_substitute(selection):
-        message = (
-            f"{names} {explain} only {100 * closed:.0f} % of the gap, but a lag or resonance that the stage really has "
-            "would explain all of it"
-        )
-        return Conclusion.UNEXPLAINED_GAP, f"No effect is named: {message}."
     if selection.accepted and not falls:
         return (
             Conclusion.INSUFFICIENT_DATA,

@@ -16,39 +16,54 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
 
-from ...effects import AmplifierSaturation, MainsHum
-from .candidate_refits import LEAST_GAIN
+from ...effects import AmplifierSaturation
+from .candidate_refits import LATER, LEAST_GAIN
 from .candidates import FittedCandidate
 from .cross_validation import Score
-from .refit import Fitted
+from .refit import without
 from .selection_result import Rejection, typical
 
 KEEPS = 0.8
 """Largest share of V beyond noise that may remain after an effect."""
-PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
-"""Smallest number of mains periods in a record, longest sample period in mains periods, smallest number of records."""
-STEADY = 0.3
-"""Smallest ratio of the quartiles of the hum amplitude."""
+
+AcceptanceTest = Callable[[FittedCandidate, Score, float], Rejection | None]
+"""Takes a fitted candidate, the score of the model before it, and V of a perfect model; None if it passes."""
 
 
-def first_rejection(best: FittedCandidate, alone: Fitted | None) -> Rejection | None:
-    """First reason to reject a fitted candidate; None if it passes all tests.
+def gains_little(best: FittedCandidate, before: Score, null: float) -> Rejection | None:
+    """The gain in cross-validation is too small."""
+    gain = before.cost - best.score.cost
+    if gain >= LEAST_GAIN:
+        return None
+    return Rejection(best.name, f"in cross-validation it lowers mean ln R² by {gain:.2f}, and {LEAST_GAIN:g} is needed")
 
-    Parameters
-    ----------
-    best : FittedCandidate
-        Refit with the effect.
-    alone : Fitted or None
-        Refit without the effect; None if it diverges.
-    """
-    owed = np.inf if alone is None else alone.score.cost - best.score.cost
-    if owed < LEAST_GAIN:
-        return Rejection(best.name, f"it gains only {owed:.2f} over the model that was refitted without it")
-    if best.name == MainsHum.name and not is_steady(best):
-        return Rejection(best.name, "its amplitude depends on the drive, which mains hum does not")
-    return None
+
+def leaves_much(best: FittedCandidate, before: Score, null: float) -> Rejection | None:
+    """Most of the error beyond noise remains."""
+    left = share_left(best.score, before, null)
+    if left <= KEEPS:
+        return None
+    return Rejection(best.name, f"{100 * left:.0f} % of the excess error remains, and {100 * KEEPS:.0f} % is allowed")
+
+
+def owes_its_gain(best: FittedCandidate, before: Score, null: float) -> Rejection | None:
+    """The gain is due to the refit of everything else, and not to the effect."""
+    alone = without(best, LATER)
+    owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
+    if owed >= LEAST_GAIN:
+        return None
+    return Rejection(best.name, f"it gains only {owed:.2f} over the model that was refitted without it")
+
+
+TESTS: tuple[AcceptanceTest, ...] = (gains_little, leaves_much, owes_its_gain)
+"""The tests, the cheap ones first; the first rejection counts."""
+
+
+def first_rejection(best: FittedCandidate, before: Score, null: float) -> Rejection | None:
+    """First reason to reject a fitted candidate; None if it passes all tests."""
+    return next((found for test in TESTS if (found := test(best, before, null)) is not None), None)
 
 
 def share_left(after: Score, before: Score, null: float) -> float:
@@ -61,26 +76,3 @@ def bends_all_along(candidate: FittedCandidate) -> bool:
     """Whether a limit bends over more than the whole drive range, so that it is a curve and not a limit."""
     saturates = candidate.name == AmplifierSaturation.name
     return saturates and candidate.effect["corner"] > candidate.training_data.extent.span
-
-
-def is_steady(candidate: FittedCandidate) -> bool:
-    """Whether a hum has about the same amplitude in all records, as mains hum does not depend on the drive."""
-    training_data, lines = candidate.training_data, 2 * candidate.training_data.nuisance.harmonics
-    frequency = training_data.nuisance.hum_frequency or 0.0
-    amplitudes = np.array(
-        [
-            np.hypot(found[-lines::2], found[1 - lines :: 2])
-            for record, floor, found in zip(
-                training_data.records, training_data.floors, candidate.fit.nuisances, strict=True
-            )
-            if np.isfinite(floor)
-            and found.size >= lines
-            and record.duration * frequency >= PERIODS
-            and record.sample_period * frequency <= RESOLVED
-        ]
-    ).reshape(-1, lines // 2)
-    if len(amplitudes) < FEWEST:
-        return True
-    strongest = amplitudes[:, int(np.argmax(np.median(amplitudes, axis=0)))]
-    low, high = np.quantile(strongest, (0.25, 0.75))
-    return bool(low > STEADY * high)

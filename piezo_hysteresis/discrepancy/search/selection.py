@@ -26,11 +26,9 @@ from ...effects import CATALOGUE, Effect
 from ...identification.fit.fit import Progress
 from ...identification.fit.normal_equations import residuals
 from ...model.model import Model
-from .acceptance_tests import KEEPS, bends_all_along, first_rejection, share_left
+from .acceptance_tests import bends_all_along, first_rejection
 from .candidate_refits import (
     CLOSE,
-    LATER,
-    LEAST_GAIN,
     finest,
     refit_candidates,
     refits_behind_new_dynamics,
@@ -40,12 +38,9 @@ from .candidate_refits import (
 from .candidates import FittedCandidate, screen
 from .cross_validation import ADEQUATE, Score
 from .execution.time_limit import TimeSpentError
-from .refit import Fitted, without
-from .selection_result import Rejection, Selection, Step, typical
+from .selection_result import Rejection, Selection, Step
 from .training_data import TrainingData
 
-ALONE = 4.0
-"""Residual in floors up to which a single record does not require a further effect."""
 REFITS = 6
 """Number of candidates that are refitted jointly."""
 HOPELESS = 0.02
@@ -84,26 +79,17 @@ def select(
     report = progress or (lambda word, fraction: None)
     baseline, steps, accepted, in_time = model, list[Step](), 0, False
     with suppress(TimeSpentError):
-        while not _is_enough(score, accepted) and accepted < MOST:
+        while score.excess > ADEQUATE and accepted < MOST:
             step = _turn(model, training_data, score, null, effects, report)
             if step is None:
                 break
             steps.append(step)
-            if step.accepted:
-                model, score, training_data = step.best.fit.model, step.best.score, step.best.training_data
-                accepted += 1
-            elif step.renewed is not None:
-                model, score = step.renewed.model, step.renewed.score
-            else:
+            if not step.accepted:
                 break
+            model, score, training_data = step.best.fit.model, step.best.score, step.best.training_data
+            accepted += 1
         in_time = True
     return Selection(baseline, model, score, tuple(steps), null, in_time, training_data)
-
-
-def _is_enough(score: Score, accepted: int) -> bool:
-    """Whether the search ends: no second effect is added because of a small misfit of a single record."""
-    is_alone = accepted > 0 and typical(score, score)[1] <= ADEQUATE and score.ratios.max() <= ALONE
-    return bool(score.excess <= ADEQUATE or is_alone)
 
 
 def _turn(
@@ -125,16 +111,14 @@ def _turn(
     if not refits:
         return None
     refits = _best_of_each([*refits, *refits_of_twins(screened, refits[0], before)])
-    best, alone, rejection = _judged(refits, before, null)
+    best, rejection = _judged(refits, before, null)
     if rejection is not None and (late := refits_behind_new_dynamics(model, screened, before)):
         refits = _best_of_each([*refits, *late])
-        best, alone, rejection = _judged(refits, before, null)
+        best, rejection = _judged(refits, before, null)
     rejection = rejection or _untried_twin(type(best.effect), effects)
     accepted, rivals = rejection is None, list[FittedCandidate]()
     rejected = [Rejection(name, f"on slow drive it equals {t}, which is in the model") for name, t in twins.items()]
     rejected += [] if rejection is None else [rejection]
-    better = alone is not None and before.cost - alone.score.cost > 0.5 * LEAST_GAIN
-    renewed = alone if better and not accepted else None
     for candidate in refits:
         if candidate.name == best.name:
             continue
@@ -150,7 +134,7 @@ def _turn(
         most = max(0.0, before.cost - other.score.cost)
         gains = f"it lowers mean ln R² by at most {most:.2f}" if most >= NO_GAIN else "it does not reduce the error"
         rejected.append(Rejection(other.name, f"in cross-validation {gains}"))
-    return Step(before, best, accepted, tuple(rivals), tuple(rejected), (*refits, *others), renewed)
+    return Step(before, best, accepted, tuple(rivals), tuple(rejected), (*refits, *others))
 
 
 def _best_of_each(refits: list[FittedCandidate]) -> list[FittedCandidate]:
@@ -167,16 +151,7 @@ def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> Re
     return None
 
 
-def _judged(
-    refits: list[FittedCandidate], before: Score, null: float
-) -> tuple[FittedCandidate, Fitted | None, Rejection | None]:
-    """The best refit, the refit without the effect (None if not needed), and the rejection of the effect or None."""
+def _judged(refits: list[FittedCandidate], before: Score, null: float) -> tuple[FittedCandidate, Rejection | None]:
+    """The best refit, and the rejection of its effect or None."""
     best = finest(simplest(refits), before)
-    gain, left = before.cost - best.score.cost, share_left(best.score, before, null)
-    if gain < LEAST_GAIN or left > KEEPS:
-        small = f"in cross-validation it lowers mean ln R² by {gain:.2f}, and {LEAST_GAIN:g} is needed"
-        much = f"{100 * left:.0f} % of the excess error remains, and {100 * KEEPS:.0f} % is allowed"
-        message = "; ".join(text for text, fails in ((small, gain < LEAST_GAIN), (much, left > KEEPS)) if fails)
-        return best, None, Rejection(best.name, message)
-    alone = without(best, LATER)
-    return best, alone, first_rejection(best, alone)
+    return best, first_rejection(best, before, null)

@@ -23,7 +23,6 @@ import numpy as np
 from ...model.model import Model
 from .candidates import Candidate, FittedCandidate
 from .cross_validation import Score
-from .refit import Fitted
 from .training_data import TrainingData
 
 MANY = 8
@@ -56,8 +55,6 @@ class Step:
         All other effects.
     tried : tuple of Candidate
         Every effect of this step with its score, refitted or, if it was too far behind, linearised at its start.
-    renewed : Fitted or None
-        A better fit of the model without the effect, if the search found one.
     """
 
     before: Score
@@ -66,7 +63,6 @@ class Step:
     rivals: tuple[FittedCandidate, ...]
     rejected: tuple[Rejection, ...]
     tried: tuple[Candidate, ...] = ()
-    renewed: Fitted | None = None
 
     @property
     def confusable_with(self) -> tuple[str, ...]:

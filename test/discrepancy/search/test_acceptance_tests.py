@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from piezo_hysteresis.discrepancy.search import acceptance_tests
 from piezo_hysteresis.discrepancy.search.acceptance_tests import bends_all_along, first_rejection
 from piezo_hysteresis.discrepancy.search.candidate_refits import simplest
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
@@ -41,12 +42,34 @@ def fitted(effect, names, covariance):
     return FittedCandidate(effect, training_data, Score(np.ones(3), np.zeros(len(names))), result)
 
 
-def test_an_effect_must_gain_over_the_model_that_was_refitted_without_it():
-    weak = fitted(GainDrift(g=0.05, tau=600.0), ("gain_drift.g", "gain_drift.tau"), np.eye(2))
-    alone = Fitted(weak.fit.model, weak.score)
-    rejection = first_rejection(weak, alone)
-    assert rejection.name == "gain_drift"
-    assert "refitted without it" in rejection.reason
+def scored(*ratios):
+    return Score(np.array(ratios), np.zeros(2))
+
+
+@pytest.mark.parametrize(
+    ("before", "alone", "reason"),
+    [
+        ((1.05, 1.05), (9.0, 9.0), "lowers mean ln R²"),
+        ((1.0, 1.3), (9.0, 9.0), None),
+        ((9.0, 9.0), (1.0, 1.0), "refitted without it"),
+        ((9.0, 9.0), (9.0, 9.0), None),
+        ((9.0, 9.0), None, None),
+    ],
+    ids=["little gain", "enough gain", "gain of the refit alone", "gain of the effect", "nothing to compare with"],
+)
+def test_an_effect_must_gain_also_over_the_model_that_was_refitted_without_it(monkeypatch, before, alone, reason):
+    drift = fitted(GainDrift(g=0.05, tau=600.0), ("gain_drift.g", "gain_drift.tau"), np.eye(2))
+    refitted = alone and Fitted(drift.fit.model, scored(*alone))
+    monkeypatch.setattr(acceptance_tests, "without", lambda candidate, iterations: refitted)
+    rejection = first_rejection(replace(drift, score=scored(1.0, 1.0)), scored(*before), 0.5)
+    assert rejection is None if reason is None else (rejection.name == "gain_drift" and reason in rejection.reason)
+
+
+def test_an_effect_that_leaves_most_of_the_error_is_rejected():
+    """C cannot see it: the logarithm counts a change of one record as much as that of a record with all of the gap."""
+    drift = fitted(GainDrift(g=0.05, tau=600.0), ("gain_drift.g", "gain_drift.tau"), np.eye(2))
+    rejection = first_rejection(replace(drift, score=scored(1.0, 29.0)), scored(3.0, 30.0), 1.0)
+    assert "of the excess error remains" in rejection.reason
 
 
 @pytest.mark.parametrize(("corner", "curve"), [(0.1, False), (4.0, False), (30.0, True)])
