@@ -42,7 +42,7 @@ from piezo_hysteresis.discrepancy.choice.live_diagnosis import LiveDiagnosis, be
 from piezo_hysteresis.effects import BY_NAME
 from piezo_hysteresis.errors import PiezoError
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
-from piezo_hysteresis.identification.protocol.protocol import ProtocolPhase
+from piezo_hysteresis.identification.protocol.phases import ProtocolPhase
 from piezo_hysteresis.record import Experiment, Record
 
 RICH = 158.7

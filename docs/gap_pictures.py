@@ -30,7 +30,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from piezo_hysteresis.discrepancy import Diagnosis, diagnose
-from piezo_hysteresis.discrepancy.next_experiment import separations
+from piezo_hysteresis.discrepancy.choice.time_to_decide import (
+    ERROR_RATE,
+    distances,
+    expected_log_odds,
+    missing_log_odds,
+    z_of,
+)
+from piezo_hysteresis.discrepancy.next_experiment import possible_drives
 from piezo_hysteresis.discrepancy.residual.noise_floor import noise_floors, stroke
 from piezo_hysteresis.discrepancy.search.acceptance_tests import KEEPS, share_left
 from piezo_hysteresis.discrepancy.search.candidate_refits import LATER, LEAST_GAIN, refit_candidates
@@ -225,18 +232,25 @@ def acceptance(diagnosis: Diagnosis) -> Figure:
 
 
 def next_phase(diagnosis: Diagnosis) -> Figure:
-    """Step 10: how well each phase would separate the two best explanations."""
+    """Step 10: how well each drive, played once, would separate the two best explanations."""
     _, fitted = refits(diagnosis)
     first, second = fitted[:2]
-    powers = separations(first.fit.model, second.fit.model, first.training_data)
-    names = sorted(powers, key=lambda name: -powers[name])
-    figure, ((axes,),) = canvas(1, 1, 3.0)
-    axes.barh(np.arange(len(names)), [powers[n] for n in names], color=[GREEN, *[BLUE] * (len(names) - 1)])
-    axes.set_yticks(np.arange(len(names)), [n.replace("_", " ") for n in names])
+    drives = possible_drives(first.training_data)
+    records = {str(k): drive.as_record() for k, drive in enumerate(drives)}
+    apart = distances(first.fit.model, second.fit.model, first.training_data, records)
+    z = {k: z_of(expected_log_odds(d, first.score.excess, 1)) for k, d in apart.items()}
+    best: dict[str, tuple[float, float]] = {}
+    for k, drive in enumerate(drives):
+        name = drive.name.replace("_", " ")
+        best[name] = max(best.get(name, (0.0, 0.0)), (z[str(k)], drive.duration))
+    names = sorted(best, key=lambda name: -best[name][0])
+    figure, ((axes,),) = canvas(1, 1, 3.6)
+    axes.barh(np.arange(len(names)), [best[n][0] for n in names], color=BLUE)
+    axes.axvline(z_of(missing_log_odds({first.name: 0.5, second.name: 0.5}, ERROR_RATE)), color=ORANGE, linestyle="--")
+    axes.set_yticks(np.arange(len(names)), [f"{n}, {best[n][1]:.3g} s" for n in names])
     axes.invert_yaxis()
-    axes.set_xscale("log")
-    title = f"How well a phase would separate {first.name} and {second.name}"
-    axes.set(title=title, xlabel="expected squared difference [floors² per second of stage time]")
+    title = f"How well a drive would separate {first.name} and {second.name}"
+    axes.set(title=title, xlabel="expected separation z [standard deviations]")
     return figure
 
 

@@ -26,8 +26,8 @@ from ..model.model import Model
 from ..picture import Pictured
 from ..record import Experiment
 from .changes.change_kinds import ParameterChange
+from .choice.time_to_decide import Separation
 from .gap import Gap
-from .next_experiment import NextExperiment
 from .residual.localise import ResidualShare
 from .search.selection_result import Rejection, Selection
 from .unnamed.correction import Correction
@@ -61,8 +61,8 @@ class Diagnosis(Pictured):
         Distribution of the residual of the baseline.
     gap : Gap or None
         Free-run error before and after.
-    next_experiment : NextExperiment or None
-        Phase that would separate two explanations that these data cannot distinguish.
+    next_experiment : Separation or None
+        Drive that would separate two explanations that these data cannot distinguish.
     experiment : Experiment
         Experiment that was compared with the model, without the noise of a measured voltage. Its notices describe the
         quality of the data, and the effects that the data cannot show.
@@ -80,7 +80,7 @@ class Diagnosis(Pictured):
     fit: Fit | None
     where: tuple[ResidualShare, ...]
     gap: Gap | None
-    next_experiment: NextExperiment | None
+    next_experiment: Separation | None
     experiment: Experiment
     change: ParameterChange | None = None
     correction: Correction | None = None
@@ -176,8 +176,8 @@ class Diagnosis(Pictured):
             "gap_percent_of_range": self._gap(),
             "rejected": [{"name": r.name, "reason": r.reason} for r in self.rejected],
             "next_experiment": None
-            if self.next_experiment is None
-            else {"phase": self.next_experiment.phase, "separates": list(self.next_experiment.separates)},
+            if (following := self.next_experiment) is None
+            else {"phase": following.drive, "separates": list(following.rivals), **following.numbers()},
             "data_quality": [
                 {"kind": n.kind, "phase": n.phase, "message": n.message, "severe": n.severe}
                 for n in self.experiment.notices
@@ -216,8 +216,7 @@ class Diagnosis(Pictured):
             lines.append(f"  {self.correction.sentence()}")
         lines += [f"  where: {p.axis.replace('_', ' ')}: {p.detail}" for p in self.where[:3]]
         if self.next_experiment is not None:
-            pair = " and ".join(self.next_experiment.separates)
-            lines.append(f"  next: record '{self.next_experiment.phase}' to separate {pair}")
+            lines.append(f"  next: {self.next_experiment.sentence()}")
         lines += [f"  {n.kind}: {n.message}" for n in self.experiment.notices if n.severe]
         return "\n".join(lines)
 

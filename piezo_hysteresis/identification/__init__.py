@@ -24,7 +24,8 @@ from .fit.fit import Fit, fit
 from .identification import Identification
 from .identify import identify
 from .protocol.drive_limits import DriveLimits
-from .protocol.protocol import Protocol, ProtocolPhase, paper, rich, short
+from .protocol.phases import ProtocolPhase
+from .protocol.protocol import Protocol, paper, rich, short
 from .steps.delay import Delay, identify_delay
 from .steps.dynamics import Dynamics, identify_arx
 from .steps.frequency_response import FrequencyResponse, periodic, welch

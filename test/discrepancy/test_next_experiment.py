@@ -12,16 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The drive that separates two models."""
+"""The drive that separates two models, and the one that is proposed after a diagnosis."""
 
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.next_experiment import distances
+from piezo_hysteresis.discrepancy.choice.time_to_decide import distances
+from piezo_hysteresis.discrepancy.next_experiment import best_next_experiment, possible_drives
+from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
+from piezo_hysteresis.discrepancy.search.cross_validation import Score
+from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
-from piezo_hysteresis.effects import Arx, BoucWen, Offset, SensorNonlinearity, Softening
+from piezo_hysteresis.effects import Arx, BoucWen, Creep, Offset, SensorNonlinearity, Softening, ThermalDrift
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.errors import DivergenceError
+from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
@@ -50,3 +55,39 @@ def test_a_drive_with_which_a_model_diverges_separates_nothing():
     found = distances(first, second, training_data, {"gentle": gentle, "violent": violent})
     assert found["gentle"] > 0.0
     assert found["violent"] == 0.0
+
+
+def rivals(period, *effects):
+    """A selection in which the data cannot distinguish two effects, from a record between 1 and 4 V."""
+    stage = Model((BoucWen(), Arx(b=(1.0,))), period, 10.0, 1e-5)
+    u = 2.5 + 1.5 * np.sin(2.0 * np.pi * period / 0.5 * np.arange(round(2.0 / period)))
+    records = (Record(u, np.zeros(u.size), period, initial_voltage=2.5),)
+    data = TrainingData(records, np.array([5e-9]), Nuisance(), Extent.of(records, 10.0, 1e-5))
+    same = Score(np.ones(1), np.zeros(1))
+    fitted = []
+    for effect in effects:
+        fit = Fit(stage.with_effect(effect), (), np.empty((0, 0)), 1.0, (), (), (), True, 1)
+        fitted.append(FittedCandidate(effect, data, same, fit))
+    step = Step(Score(np.full(1, 9.0), np.zeros(1)), fitted[0], True, tuple(fitted[1:]), ())
+    return Selection(stage, fitted[0].fit.model, same, (step,), 1.0), data
+
+
+@pytest.mark.parametrize("period", [1e-3, 2e-2])
+def test_the_proposed_drive_separates_the_rivals_inside_the_recorded_range(period):
+    selection, data = rivals(period, Creep(gamma=0.02), ThermalDrift(D=3e-7, tau=60.0))
+    found = best_next_experiment(selection, data)
+    assert found.decides
+    assert {*found.rivals} == {"creep", "thermal_drift"}
+    assert found.drive in {d.name for d in possible_drives(data)}
+    recorded = data.records[0].voltage
+    for drive in possible_drives(data):
+        assert recorded.min() <= drive.voltage.min() <= drive.voltage.max() <= recorded.max()
+
+
+def test_equal_rivals_are_told_that_no_drive_decides():
+    selection, data = rivals(1e-3, Creep(gamma=0.02), Creep(gamma=0.02))
+    assert best_next_experiment(selection, data) is None
+    selection, data = rivals(1e-3, Creep(gamma=0.0), ThermalDrift(D=0.0, tau=60.0))
+    found = best_next_experiment(selection, data)
+    assert not found.decides
+    assert found.expected_z == pytest.approx(0.0, abs=1e-3)

@@ -27,7 +27,8 @@ from ... import recording
 from ...acquisition.phase_recorder import record_phases
 from ...acquisition.session import DriverSession
 from ...acquisition.settings import DriverSettings
-from ...discrepancy.choice.live_diagnosis import ERROR_RATE, LONGEST, LiveDiagnosis, begin
+from ...discrepancy.choice.live_diagnosis import LiveDiagnosis, begin
+from ...discrepancy.choice.time_to_decide import ERROR_RATE, LONGEST
 from ...errors import ParameterError
 from ...identification.protocol.protocol import Protocol
 from ...record import Experiment, Record

@@ -23,21 +23,17 @@ from ...effects import CATALOGUE, Effect
 from ...errors import ParameterError
 from ...identification.fit.fit import Progress
 from ...identification.protocol.drive_limits import DriveLimits
-from ...identification.protocol.protocol import ProtocolPhase
+from ...identification.protocol.phases import ProtocolPhase
 from ...record import Experiment
 from ..diagnose import diagnose
 from ..diagnosis import Diagnosis, Verdict
 from .probabilities import NONE_OF_THESE, NOTHING, probabilities
-from .rivals import missing_log_odds, rivals_of
+from .rivals import rivals_of
 from .still_hidden import still_hidden
 from .tiers import FAST_TIERS, SLOW_FAMILIES, Tier, spare_drives, tiers
-from .time_to_decide import Separation, best_drive
+from .time_to_decide import ERROR_RATE, LONGEST, Separation, best_drive, missing_log_odds
 from .update import End, Update, percent
 
-ERROR_RATE = 0.005
-"""Default of the accepted probability of a wrong answer."""
-LONGEST = 600.0
-"""Default of the longest stage time [s]."""
 MOST_RIVALS = 3
 """Largest number of rivals for which a drive is chosen; with more rivals the fixed order continues."""
 
@@ -175,10 +171,7 @@ class LiveDiagnosis:
             else {
                 "rivals": list(self.separation.rivals),
                 "drive": self.separation.drive,
-                "repeats": self.separation.repeats,
-                "duration_s": self.separation.duration,
-                "expected_z": self.separation.expected_z,
-                "needed_z": self.separation.needed_z,
+                **self.separation.numbers(),
             },
         }
 

@@ -31,6 +31,7 @@ from ..diagnosis import Diagnosis, Verdict
 from ..search.cross_validation import ADEQUATE, Score
 from ..search.selection_result import Step
 from ..verdict import FAR, NAMED, NAMED_FAR
+from .time_to_decide import ONE_RECORD
 
 Array = NDArray[np.float64]
 
@@ -38,8 +39,6 @@ NOTHING, NONE_OF_THESE = "nothing", "none of these"
 """The two explanations that are not effects of the catalogue."""
 PRIOR_NOTHING, PRIOR_NONE = 0.4, 0.1
 """Prior probabilities that nothing is missing, and that the missing effect is not in the catalogue."""
-ONE_RECORD = 4.0
-"""Largest contribution of one record to the log-odds of two explanations. An error rate of 0.5 % needs 5.3."""
 
 
 def probabilities(found: Diagnosis, effects: Collection[str], unplayed: Collection[str] = ()) -> dict[str, float]:

@@ -12,37 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Rivals: the fitted explanations that are too likely to be excluded, and the log-odds needed to separate them."""
+"""Rivals: the fitted explanations that are too likely to be excluded."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from ..diagnosis import Diagnosis
 from ..search.candidates import FittedCandidate
 from .probabilities import NONE_OF_THESE, NOTHING
-
-
-def missing_log_odds(probabilities: Mapping[str, float], error_rate: float) -> float:
-    """Additional log-odds between the two likeliest explanations that a certain answer needs.
-
-    Parameters
-    ----------
-    probabilities : mapping of str to float
-        Probability of every explanation.
-    error_rate : float
-        Accepted probability of a wrong answer.
-
-    Examples
-    --------
-    >>> round(missing_log_odds({"creep": 0.5, "thermal_drift": 0.5}, 0.005), 2)
-    5.29
-    """
-    first, second, *_ = (*sorted(probabilities.values(), reverse=True), 0.0)
-    wanted = np.log((1.0 - error_rate) / error_rate)
-    return float(max(wanted - np.log(first / max(second, 1e-300)), 0.0))
 
 
 def rivals_of(found: Diagnosis | None, probabilities: Mapping[str, float], error_rate: float) -> list[FittedCandidate]:
@@ -54,8 +32,10 @@ def rivals_of(found: Diagnosis | None, probabilities: Mapping[str, float], error
     ----------
     found : Diagnosis or None
         The last diagnosis.
-    probabilities, error_rate
-        As for `missing_log_odds`.
+    probabilities : mapping of str to float
+        Probability of every explanation.
+    error_rate : float
+        Probability below which an explanation is excluded.
     """
     if found is None or found.selection is None or not found.selection.steps:
         return []

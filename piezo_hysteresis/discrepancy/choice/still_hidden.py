@@ -20,7 +20,7 @@ error of the later phases would stay at the noise floor, so that these phases gi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import scipy
@@ -30,7 +30,7 @@ from ...effects import Effect
 from ...identification.fit.covariance import sandwich
 from ...identification.fit.form_uncertainty import PIECES
 from ...identification.fit.normal_equations import grams
-from ...identification.protocol.protocol import ProtocolPhase
+from ...identification.protocol.phases import ProtocolPhase
 from ...model.model import Model
 from ...record import Record
 from ..search.candidates import directions, free_numbers
@@ -76,7 +76,8 @@ def still_hidden(
     """
     z = float(scipy.stats.norm.isf(0.5 * error_rate))
     floor = float(np.min(training_data.floors))
-    records = list(_to_come(phases, clock))
+    starts_at = clock + np.cumsum([0.0, *(p.duration for p in phases[:-1])])
+    records = [p.as_record(float(t)) for p, t in zip(phases, starts_at, strict=True)]
     found = set[str]()
     for effect in effects:
         starts = effect.starts(training_data.extent) if effect.channel is None else ()
@@ -121,12 +122,3 @@ def _may_show(
     reach = left @ (np.outer(estimate, estimate) + z**2 * spread) @ left.T
     shown = grams(extended, records, [*base, *sizes])
     return float(np.mean([np.sum(g.matrix[:-1, :-1] * reach) / g.size for g in shown]))
-
-
-def _to_come(phases: Sequence[ProtocolPhase], clock: float) -> Iterator[Record]:
-    """The phases as records from rest; their displacement is not known yet."""
-    for phase in phases:
-        record = Record(phase.voltage, np.zeros(phase.voltage.size), phase.sample_period, phase.name, start_time=clock)
-        every = phase.stored_every
-        yield record.decimate(every) if 1 < every <= record.size else record
-        clock += phase.duration

@@ -16,17 +16,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...effects import Creep, GainDrift
 from ...identification.protocol import excitation
-from ...identification.protocol.drive_limits import DriveLimits, Samples
-from ...identification.protocol.protocol import CORNERED, Protocol, ProtocolPhase
-from ...record import CONDITIONING
+from ...identification.protocol.drive_limits import DriveLimits
+from ...identification.protocol.phases import Phases, ProtocolPhase
+from ...identification.protocol.protocol import Protocol
 
 SLOW, SLOWEST = 1e-3, 1e-2
 """Sample periods at which slow phases are stored [s]."""
+SHORT = 0.4
+"""Length of a noise phase [s]."""
 SLOW_FAMILIES = (Creep.family, GainDrift.family)
 """Families of effects that only long phases show."""
 FAST_TIERS = 2
@@ -54,51 +55,6 @@ class Tier:
         return sum(p.duration for p in self.phases)
 
 
-class _Phases:
-    """Collects phases inside the limits."""
-
-    def __init__(self, limits: DriveLimits, seed: int) -> None:
-        self.limits, self.seed, self.phases = limits, seed, list[ProtocolPhase]()
-
-    def add(self, name: str, body: Samples, stored_period: float = 0.0) -> None:
-        every = max(1, int(stored_period / self.limits.sample_period + 1e-9))
-        self.phases.append(ProtocolPhase(name, self.limits.from_safe_to_safe(body), self.limits.sample_period, every))
-
-    def noise(self, rms: float) -> None:
-        self.seed += 1
-        bandwidth = 0.2 / self.limits.sample_period
-        self.add("noise", excitation.noise(self.limits, rms, bandwidth, 0.4, centre=0.35, seed=self.seed))
-
-    def multisine(self, amplitude: float) -> None:
-        self.seed += 1
-        highest = min(2000.0, 0.2 / self.limits.sample_period)
-        self.add(
-            "multisine", excitation.multisine(self.limits, 20.0, highest, amplitude, 4, centre=0.5, seed=self.seed)
-        )
-
-    def triangle(self, peaks: Sequence[float], frequency: float = 1.0) -> None:
-        self.add("triangle", excitation.triangle(self.limits, peaks, frequency), CORNERED)
-
-    def sines(self, *frequencies: float) -> None:
-        for frequency in frequencies:
-            body = excitation.sine(self.limits, frequency, max(0.1, 2.0 / frequency))
-            self.add(f"sine_{frequency:g}hz", body, SLOW if frequency <= 10.0 else 0.0)
-
-    def staircase(self, levels: Sequence[float], hold: float) -> None:
-        body = excitation.steps(self.limits, levels, hold, slew_rate=self.limits.ramp_rate)
-        self.add("staircase", body, SLOWEST)
-
-    def minor_loops(self, corners: Sequence[float]) -> None:
-        self.add("minor_loops", excitation.ramps(self.limits, corners, 2.0 * self.limits.span), CORNERED)
-
-    def rest(self, level: float, duration: float) -> None:
-        self.add("rest", excitation.hold(self.limits, level, duration), SLOWEST)
-
-    def taken(self) -> tuple[ProtocolPhase, ...]:
-        phases, self.phases = tuple(self.phases), []
-        return phases
-
-
 def tiers(limits: DriveLimits, seed: int = 0) -> tuple[Tier, ...]:
     """All tiers, about 70 s of stage time on the default range.
 
@@ -109,38 +65,38 @@ def tiers(limits: DriveLimits, seed: int = 0) -> tuple[Tier, ...]:
     seed : int
         Seed of the random waveforms.
     """
-    made = _Phases(limits, seed)
-    corners = (0.0, 1.0, 0.0, *excitation.decaying_loops(0.5, 0.7, 12))
-    made.add(CONDITIONING, excitation.ramps(limits, corners, limits.ramp_rate), CORNERED)
-    made.add("step", excitation.steps(limits, (0.2, 0.5, 0.8, 0.5) * 4, 0.01))
+    made = Phases(limits, seed)
+    fast_loops = 2.0 * limits.span
+    made.conditioning()
+    made.step(edges=15, duration=0.01)
     for rms in (0.012, 0.012, 0.003):
-        made.noise(rms)
+        made.noise(rms, SHORT)
     made.triangle((1.0, 0.5))
-    made.sines(100.0, 300.0)
+    made.sines(100.0, 300.0, slow_period=SLOW)
     for _ in range(2):
         made.multisine(0.3)
     made.triangle((0.75, 0.25))
-    made.minor_loops(excitation.nested_loops(0.45, 5))
+    made.minor_loops(excitation.nested_loops(0.45, 5), fast_loops)
     first = Tier("loops and dynamics", made.taken())
 
     for _ in range(2):
         made.multisine(0.05)
-    made.noise(0.003)
-    made.add("steps", excitation.steps(limits, (0.05, 0.95) * 4, 0.005, slew_rate=2e3 * limits.span))
-    made.add("step", excitation.steps(limits, (0.2, 0.5, 0.8, 0.5) * 4, 0.01))
-    made.sines(50.0, 200.0, 400.0)
-    made.staircase((0.0, 0.5, 1.0, 0.5, 0.0), 1.0)
-    made.minor_loops(excitation.decaying_loops(0.5, 0.75, 12))
+    made.noise(0.003, SHORT)
+    made.steps()
+    made.step(edges=15, duration=0.01)
+    made.sines(50.0, 200.0, 400.0, slow_period=SLOW)
+    made.staircase((0.0, 0.5, 1.0, 0.5, 0.0), 1.0, SLOWEST)
+    made.minor_loops(excitation.decaying_loops(0.5, 0.75, 12), fast_loops)
     second = Tier("small and fast drives, short holds", made.taken())
 
-    made.sines(1.0)
-    made.staircase((0.0, 0.33, 0.67, 1.0, 0.67, 0.33, 0.0), 2.0)
-    made.rest(0.0, 2.0)
+    made.sines(1.0, slow_period=SLOW)
+    made.staircase((0.0, 0.33, 0.67, 1.0, 0.67, 0.33, 0.0), 2.0, SLOWEST)
+    made.rest(0.0, 2.0, SLOWEST)
     made.triangle((1.0, 0.5))
     third = Tier("holds", made.taken())
 
-    made.staircase((0.0, 0.5, 1.0, 0.5, 0.0), 4.0)
-    made.rest(0.0, 3.0)
+    made.staircase((0.0, 0.5, 1.0, 0.5, 0.0), 4.0, SLOWEST)
+    made.rest(0.0, 3.0, SLOWEST)
     made.triangle((1.0, 0.25))
     made.multisine(0.3)
     fourth = Tier("long holds, and repetitions of earlier phases", made.taken())
@@ -149,16 +105,16 @@ def tiers(limits: DriveLimits, seed: int = 0) -> tuple[Tier, ...]:
 
 def spare_drives(limits: DriveLimits, seed: int = 0) -> tuple[ProtocolPhase, ...]:
     """Further drives to separate rivals: longer, faster or larger than those of the tiers."""
-    made = _Phases(limits, seed + 1000)
-    made.staircase((0.0, 0.8, 0.2), 10.0)
-    made.add("staircase", excitation.hold(limits, 0.8, 40.0), SLOWEST)
-    made.rest(0.0, 30.0)
-    made.minor_loops(excitation.nested_loops(0.45, 8))
+    made = Phases(limits, seed + 1000)
+    made.staircase((0.0, 0.8, 0.2), 10.0, SLOWEST)
+    made.staircase((0.8,), 40.0, SLOWEST)
+    made.rest(0.0, 30.0, SLOWEST)
+    made.minor_loops(excitation.nested_loops(0.45, 8), 2.0 * limits.span)
     made.triangle((1.0, 0.5), 0.2)
     made.triangle((0.5, 0.25), 5.0)
-    made.sines(1.0, 10.0, 700.0)
+    made.sines(1.0, 10.0, 700.0, slow_period=SLOW)
     made.multisine(0.4)
-    made.noise(0.03)
+    made.noise(0.03, SHORT)
     return made.taken()
 
 

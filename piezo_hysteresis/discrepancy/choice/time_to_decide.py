@@ -16,19 +16,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
+from ...errors import DivergenceError
+from ...identification.fit.fit import gauge
 from ...identification.fit.form_uncertainty import PIECES
-from ...identification.protocol.protocol import ProtocolPhase
+from ...identification.fit.normal_equations import grams
+from ...identification.protocol.phases import ProtocolPhase
+from ...model.model import Model
 from ...record import Record
-from ..next_experiment import distances
-from ..search.candidates import FittedCandidate
-from .probabilities import ONE_RECORD
+from ..search.candidates import FittedCandidate, free_numbers, weighted_sum
+from ..search.training_data import TrainingData
 
+ERROR_RATE, LONGEST = 0.005, 600.0
+"""Defaults of the accepted probability of a wrong answer, and of the longest stage time [s]."""
+ONE_RECORD = 4.0
+"""Largest contribution of one record to the log-odds of two explanations. An error rate of 0.5 % needs 5.3."""
 REPEATS = (1, 2, 4, 8)
 """Possible numbers of repeats of a drive before the next decision."""
 
@@ -65,6 +72,15 @@ class Separation:
         """Whether the drive is expected to decide."""
         return self.expected_z >= self.needed_z
 
+    def numbers(self) -> dict[str, float]:
+        """The drive and what it is expected to show, as in ``answer.json``."""
+        return {
+            "repeats": self.repeats,
+            "duration_s": self.duration,
+            "expected_z": self.expected_z,
+            "needed_z": self.needed_z,
+        }
+
     def sentence(self) -> str:
         """The separation in words."""
         first, second = (name.replace("_", " ") for name in self.rivals)
@@ -79,6 +95,26 @@ class Separation:
 def z_of(log_odds: float) -> float:
     """Separation z in standard deviations that gives these log-odds on average, z²/2."""
     return float(np.sqrt(2.0 * max(log_odds, 0.0)))
+
+
+def missing_log_odds(probabilities: Mapping[str, float], error_rate: float) -> float:
+    """Additional log-odds between the two likeliest explanations that a certain answer needs.
+
+    Parameters
+    ----------
+    probabilities : mapping of str to float
+        Probability of every explanation.
+    error_rate : float
+        Accepted probability of a wrong answer.
+
+    Examples
+    --------
+    >>> round(missing_log_odds({"creep": 0.5, "thermal_drift": 0.5}, 0.005), 2)
+    5.29
+    """
+    first, second, *_ = (*sorted(probabilities.values(), reverse=True), 0.0)
+    wanted = np.log((1.0 - error_rate) / error_rate)
+    return float(max(wanted - np.log(first / max(second, 1e-300)), 0.0))
 
 
 def expected_log_odds(distance: float, excess: float, repeats: int) -> float:
@@ -106,6 +142,45 @@ def expected_log_odds(distance: float, excess: float, repeats: int) -> float:
     return float(repeats * min(ONE_RECORD, 0.5 * PIECES * np.log1p(distance / max(1.0, excess))))
 
 
+def distances(
+    first: Model, second: Model, training_data: TrainingData, drives: Mapping[str, Record]
+) -> dict[str, float]:
+    """Mean squared difference of two models on every drive, after the first has adjusted its parameters, in floors².
+
+    It is 0 if one of the models diverges, because the drive is then far outside what the models describe.
+
+    Parameters
+    ----------
+    first, second : Model
+        Fitted models, one with each effect.
+    training_data : TrainingData
+        Recorded data, which constrain the common parameters.
+    drives : mapping of str to Record
+        Drives from rest; their displacement is not used.
+    """
+    free = free_numbers(first, training_data)
+    directions = gauge(first, free)
+    known = weighted_sum(grams(first, training_data.records, free, training_data.nuisance), training_data.floors)
+    prior = directions.T @ known[:-1, :-1] @ directions
+    floor = float(np.min(training_data.floors))
+    found = {}
+    for name, record in drives.items():
+        try:
+            (difference,) = (a - b for a, b in zip(second.simulate(record), first.simulate(record), strict=True))
+        except DivergenceError:
+            found[name] = 0.0
+            continue
+        (gram,) = grams(first, [record], free, training_data.nuisance, [difference[None, :]])
+        total = gram.matrix[:-1, :-1] / (gram.size * floor * floor)
+        q = len(free)
+        cross = directions.T @ total[:q, q]
+        inner = prior + directions.T @ total[:q, :q] @ directions
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
+        solved = np.linalg.lstsq(inner * np.outer(scale, scale), scale * cross, rcond=1e-9)[0] * scale
+        found[name] = max(0.0, float(total[q, q] - cross @ solved))
+    return found
+
+
 def best_drive(
     rivals: Sequence[FittedCandidate],
     drives: Sequence[ProtocolPhase],
@@ -128,7 +203,7 @@ def best_drive(
     time_left : float
         Remaining stage time [s].
     """
-    records = {str(k): _as_record(phase) for k, phase in enumerate(drives)}
+    records = {str(k): phase.as_record() for k, phase in enumerate(drives)}
     pairs = list(combinations(rivals, 2))
     by_pair = [distances(a.fit.model, b.fit.model, a.training_data, records) for a, b in pairs]
     options = []
@@ -154,9 +229,3 @@ def best_drive(
     else:
         separation, phase = max(options, key=lambda option: option[0].expected_z)
     return (phase,) * separation.repeats, separation
-
-
-def _as_record(phase: ProtocolPhase) -> Record:
-    """The drive as it will be stored; the displacement is not known yet."""
-    record = Record(phase.voltage, np.zeros(phase.voltage.size), phase.sample_period, phase.name)
-    return record.decimate(phase.stored_every) if 1 < phase.stored_every <= record.size else record

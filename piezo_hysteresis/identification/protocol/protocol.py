@@ -12,63 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`ProtocolPhase` and `Protocol`: the waveforms that are played to a stage, their order, and how they are stored."""
+"""`Protocol`: the phases that are played to a stage, in their order; and the three protocols of the package."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
 from ...errors import IdentificationError
 from ...parameter import slew_text
-from ...record import CONDITIONING
 from . import excitation
-from .drive_limits import DriveLimits, Samples
+from .drive_limits import DriveLimits
+from .phases import CORNERED, Phases, ProtocolPhase
 
 SINES = (1.0, 50.0, 100.0, 200.0, 300.0, 400.0)
 """Frequencies of the paper, Table 1 [Hz]."""
-
-CORNERED = 1e-4
-"""Longest stored sample period [s] of loops with sharp turning points, because averaging flattens them."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class ProtocolPhase:
-    """One waveform of a protocol.
-
-    Parameters
-    ----------
-    name : str
-        Phase name, e.g. ``"triangle"``.
-    voltage : (n,) array
-        Drive at `sample_period`, from the safe voltage to the safe voltage [V].
-    sample_period : float
-        Period at which the drive is played [s].
-    stored_every : int
-        Number of samples averaged into one when the phase is stored (`Record.decimate`); 1 to keep the dynamics.
-    """
-
-    name: str
-    voltage: Samples
-    sample_period: float
-    stored_every: int = 1
-
-    @property
-    def duration(self) -> float:
-        """Length [s]."""
-        return float(self.voltage.size * self.sample_period)
-
-    @property
-    def stored_period(self) -> float:
-        """Sample period at which the phase is stored [s]."""
-        return self.stored_every * self.sample_period
-
-    @property
-    def largest_slew(self) -> float:
-        """Steepest change between two samples [V/s]."""
-        return float(np.max(np.abs(np.diff(self.voltage)), initial=0.0)) / self.sample_period
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,59 +101,6 @@ class Protocol:
         )
 
 
-class _Plan:
-    """Collects phases made from the shapes of `excitation`."""
-
-    def __init__(self, limits: DriveLimits, seed: int) -> None:
-        self.limits, self.seed, self.phases = limits, seed, list[ProtocolPhase]()
-
-    def add(self, name: str, body: Samples, stored_period: float = 0.0) -> None:
-        """Append a phase with a stored sample period of at most `stored_period` [s]."""
-        every = max(1, int(stored_period / self.limits.sample_period + 1e-9))
-        self.phases.append(ProtocolPhase(name, self.limits.from_safe_to_safe(body), self.limits.sample_period, every))
-
-    def next_seed(self) -> int:
-        self.seed += 1
-        return self.seed
-
-    def conditioning(self) -> None:
-        """Two full strokes and decaying loops, which remove the influence of the past motion."""
-        corners = (0.0, 1.0, 0.0, *excitation.decaying_loops(0.5, 0.7, 12))
-        self.add(CONDITIONING, excitation.ramps(self.limits, corners, self.limits.ramp_rate), CORNERED)
-
-    def step(self, edges: int, duration: float) -> None:
-        """Edges of 0.3 of the range at several levels: large enough to see the onset, small enough for the stage."""
-        levels = tuple((0.2, 0.5, 0.8, 0.5)[k % 4] for k in range(edges + 1))
-        self.add("step", excitation.steps(self.limits, levels, duration))
-
-    def noise(self, rms: float, duration: float) -> None:
-        body = excitation.noise(
-            self.limits, rms, 0.2 / self.limits.sample_period, duration, centre=0.35, seed=self.next_seed()
-        )
-        self.add("noise", body)
-
-    def triangle(self, peaks: tuple[float, ...] = (1.0, 0.75, 0.5, 0.25)) -> None:
-        self.add("triangle", excitation.triangle(self.limits, peaks, 1.0), CORNERED)
-
-    def sines(self, frequencies: tuple[float, ...], slow_period: float) -> None:
-        for frequency in frequencies:
-            duration = max(0.1, 3.0 / frequency) if frequency > 10.0 else 2.0 / frequency
-            body = excitation.sine(self.limits, frequency, duration)
-            self.add(f"sine_{frequency:g}hz", body, slow_period if frequency <= 10.0 else 0.0)
-
-    def multisine(self, amplitude: float, fundamental: float, highest: float, periods: int) -> None:
-        body = excitation.multisine(
-            self.limits, fundamental, highest, amplitude, periods, centre=0.5, seed=self.next_seed()
-        )
-        self.add("multisine", body)
-
-    def validation(self, duration: float) -> None:
-        self.add("validation", excitation.mixture(self.limits, duration, self.next_seed()))
-
-    def protocol(self, name: str) -> Protocol:
-        return Protocol(name, self.limits, tuple(self.phases))
-
-
 def paper(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
     """The three published steps (paper, Sec. 3.2 to 3.4), the sines of Table 1 and a validation phase.
 
@@ -206,59 +111,56 @@ def paper(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
     seed : int
         Seed of the random waveforms.
     """
-    plan = _Plan(limits or DriveLimits(), seed)
+    plan = Phases(limits or DriveLimits(), seed)
     plan.step(edges=32, duration=0.01)
     plan.noise(rms=0.012, duration=2.0)
     plan.triangle()
-    plan.sines(SINES, slow_period=CORNERED)
+    plan.sines(*SINES, slow_period=CORNERED)
     plan.validation(2.0)
-    return plan.protocol("paper")
+    return Protocol("paper", plan.limits, plan.taken())
 
 
 def short(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
     """All phases that an identification needs, about 25 s of stage time; parameters as in `paper`."""
-    plan = _Plan(limits or DriveLimits(), seed)
-    limits = plan.limits
+    plan = Phases(limits or DriveLimits(), seed)
     plan.conditioning()
-    plan.add("rest", excitation.hold(limits, 0.0, 0.2))
+    plan.rest(0.0, 0.2)
     plan.step(edges=32, duration=0.01)
     plan.noise(rms=0.012, duration=0.8)
     plan.noise(rms=0.003, duration=0.4)
     plan.triangle()
-    plan.sines(SINES, slow_period=CORNERED)
-    plan.multisine(amplitude=0.2, fundamental=10.0, highest=2000.0, periods=4)
-    plan.add("minor_loops", excitation.ramps(limits, excitation.nested_loops(0.45, 5), limits.ramp_rate / 2), CORNERED)
+    plan.sines(*SINES, slow_period=CORNERED)
+    plan.multisine(amplitude=0.2, fundamental=10.0)
+    plan.minor_loops(excitation.nested_loops(0.45, 5), plan.limits.ramp_rate / 2)
     plan.validation(1.0)
     plan.triangle((1.0,))
-    return plan.protocol("short")
+    return Protocol("short", plan.limits, plan.taken())
 
 
 def rich(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
     """Long protocol that shows every effect of the catalogue, about 175 s; parameters as in `paper`."""
-    plan = _Plan(limits or DriveLimits(), seed)
+    plan = Phases(limits or DriveLimits(), seed)
     limits = plan.limits
     slow, slowest = 1e-3, 1e-2
-    span, ramp_rate = limits.span, limits.ramp_rate
     plan.conditioning()
-    plan.add("rest", excitation.hold(limits, 0.0, 2.0), slow)
+    plan.rest(0.0, 2.0, slow)
     plan.step(edges=32, duration=0.01)
     for rms in (0.012, 0.003):
         plan.noise(rms, duration=0.5)
         plan.noise(rms, duration=0.5)
     plan.triangle()
-    plan.sines(SINES, slow_period=slow)
+    plan.sines(*SINES, slow_period=slow)
     for amplitude in (0.3, 0.05):
         for _ in range(2):
-            plan.multisine(amplitude, fundamental=20.0, highest=2000.0, periods=4)
-    plan.add("steps", excitation.steps(limits, (0.05, 0.95) * 4, 0.005, slew_rate=2e3 * span))
+            plan.multisine(amplitude)
+    plan.steps()
     plan.add("chirp", excitation.chirp(limits, (20.0, 3000.0), 0.5, centre=0.5, amplitude=0.1))
-    staircase = (0.0, 0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0)
-    plan.add("staircase", excitation.steps(limits, staircase, 10.0, slew_rate=ramp_rate), slowest)
-    plan.add("minor_loops", excitation.ramps(limits, excitation.nested_loops(0.45, 6), span), CORNERED)
-    plan.add("minor_loops", excitation.ramps(limits, excitation.decaying_loops(0.5, 0.75, 12), span), CORNERED)
-    plan.add("rest", excitation.hold(limits, 0.0, 10.0), slowest)
+    plan.staircase((0.0, 0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0), 10.0, slowest)
+    plan.minor_loops(excitation.nested_loops(0.45, 6), limits.span)
+    plan.minor_loops(excitation.decaying_loops(0.5, 0.75, 12), limits.span)
+    plan.rest(0.0, 10.0, slowest)
     plan.add("hold", excitation.hold(limits, 0.6, 20.0), slowest)
     plan.validation(2.0)
     plan.validation(2.0)
     plan.triangle()
-    return plan.protocol("rich")
+    return Protocol("rich", limits, plan.taken())

@@ -25,7 +25,7 @@ import numpy as np
 
 from ...compensation import IterativeLearning, Limits, Plan, plan
 from ...errors import StageError, printable
-from ...identification.protocol.protocol import ProtocolPhase
+from ...identification.protocol.phases import ProtocolPhase
 from ..identification.driver_client import DriverClient
 from .applied_state import AppliedState
 from .status import CompensationStatus

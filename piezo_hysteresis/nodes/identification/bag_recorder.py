@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Collection
 from pathlib import Path
 
@@ -59,14 +58,8 @@ class BagRecorder:
         self._node, self._bag = node, BagWriter(path)
         self.counts = dict.fromkeys(topics, 0)
         self.failure: RecordingError | None = None
-        self._last = time.monotonic()
         self._newest, self._reader = b"", SampleReader()
         self._subscriptions = [self._subscribe(name) for name in topics]
-
-    @property
-    def silence(self) -> float:
-        """Time since the last block of samples [s]."""
-        return time.monotonic() - self._last
 
     def holds(self, index: int) -> bool:
         """True where the newest sample written is number `index` (modulo 2³²) or a later one."""
@@ -103,7 +96,7 @@ class BagRecorder:
 
     def _write(self, name: str, topic: str, message: bytes) -> None:
         if name == "samples":
-            self._last, self._newest = time.monotonic(), message
+            self._newest = message
         if self.failure is not None:
             return
         try:

@@ -24,7 +24,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 
 from ...errors import reason_of
-from ...identification.protocol.protocol import ProtocolPhase
+from ...identification.protocol.phases import ProtocolPhase
 from ..messages.conversions import command_to_cloud
 from ..runtime.sending import is_taken_by, send
 from ..topics import advertise

@@ -34,7 +34,7 @@ from std_srvs.srv import Trigger
 
 from ...errors import PiezoError, printable
 from ...identification.protocol.drive_limits import DriveLimits
-from ...identification.protocol.protocol import ProtocolPhase
+from ...identification.protocol.phases import ProtocolPhase
 from ..messages.conversions import values_of
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send

@@ -25,7 +25,7 @@ from typing import Any
 from ...discrepancy.choice.live_diagnosis import LiveDiagnosis, begin
 from ...errors import IdentificationError, RecordingError
 from ...identification.protocol.drive_limits import DriveLimits
-from ...identification.protocol.protocol import ProtocolPhase
+from ...identification.protocol.phases import ProtocolPhase
 from ...model.model_file import dumps
 from ...record import Experiment, Record
 from ...recording import read

@@ -23,7 +23,8 @@ from typing import TypeVar
 
 from ...errors import PiezoError, RecordingError, StageError
 from ...identification.protocol.drive_limits import DriveLimits
-from ...identification.protocol.protocol import Protocol, ProtocolPhase
+from ...identification.protocol.phases import ProtocolPhase
+from ...identification.protocol.protocol import Protocol
 from ..runtime.guarded_node import GuardedNode
 from .bag_recorder import BagRecorder
 from .driver_client import DriverClient
@@ -223,6 +224,7 @@ def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, pro
     # a device that plays from its memory sends nothing before the end
     longest_silence = PATIENCE + 2.0 * phase.duration
     answer, end = WaitLimit(PATIENCE), WaitLimit(PATIENCE)
+    seen, silence = recorder.counts["samples"], WaitLimit(longest_silence)
     while driver.state != "done":
         if driver.state in ("refused", "stopped"):
             raise StageError(f"phase '{phase.name}' was {driver.state}: {driver.reason}")
@@ -233,7 +235,9 @@ def _play(driver: DriverClient, recorder: BagRecorder, phase: ProtocolPhase, pro
                 f"phase '{phase.name}': {driver.missing} is no longer there; see /diagnostics and the log of the driver"
             )
         _require_claim(driver)
-        if recorder.silence > longest_silence:
+        if recorder.counts["samples"] > seen:
+            seen, silence = recorder.counts["samples"], WaitLimit(longest_silence)
+        if silence.has_passed():
             raise StageError(f"phase '{phase.name}': no samples for {longest_silence:g} s; is the driver alive?")
         is_played = driver.state == "playing" and recorder.holds(driver.first_index + phase.voltage.size)
         if is_played and end.has_passed():

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ...discrepancy.choice.live_diagnosis import ERROR_RATE, LONGEST
+from ...discrepancy.choice.time_to_decide import ERROR_RATE, LONGEST
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import Protocol, paper, rich, short
 from ...parameter import Parameter, Row, Setting

@@ -24,14 +24,18 @@ from hypothesis import strategies as st
 from piezo_hysteresis.discrepancy.choice.probabilities import (
     NONE_OF_THESE,
     NOTHING,
-    ONE_RECORD,
     log_odds,
     scatter_odds,
     step_probabilities,
 )
-from piezo_hysteresis.discrepancy.choice.rivals import missing_log_odds
 from piezo_hysteresis.discrepancy.choice.tiers import spare_drives, tiers
-from piezo_hysteresis.discrepancy.choice.time_to_decide import best_drive, expected_log_odds, z_of
+from piezo_hysteresis.discrepancy.choice.time_to_decide import (
+    ONE_RECORD,
+    best_drive,
+    expected_log_odds,
+    missing_log_odds,
+    z_of,
+)
 from piezo_hysteresis.discrepancy.search.candidates import Candidate, FittedCandidate
 from piezo_hysteresis.discrepancy.search.cross_validation import Score
 from piezo_hysteresis.discrepancy.search.selection_result import Step

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import PointCloud2
 
-from piezo_hysteresis.identification.protocol.protocol import ProtocolPhase
+from piezo_hysteresis.identification.protocol.phases import ProtocolPhase
 from piezo_hysteresis.nodes.identification.command_sender import CommandSender
 from piezo_hysteresis.nodes.identification.driver_client import DriverClient
 

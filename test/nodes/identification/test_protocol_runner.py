@@ -24,7 +24,8 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from piezo_hysteresis.errors import StageError
-from piezo_hysteresis.identification.protocol.protocol import Protocol, ProtocolPhase
+from piezo_hysteresis.identification.protocol.phases import ProtocolPhase
+from piezo_hysteresis.identification.protocol.protocol import Protocol
 from piezo_hysteresis.nodes.driver.driver_node import DriverNode
 from piezo_hysteresis.nodes.identification.driver_client import DriverClient
 from piezo_hysteresis.nodes.identification.protocol_runner import run_protocol
