@@ -113,7 +113,11 @@ class MissingPackageError(PiezoError, ImportError):
     """
 
     def __init__(self, what: str, package: str, extra: str) -> None:
-        super().__init__(
+        super().__init__(what, package, extra)
+
+    def __str__(self) -> str:
+        what, package, extra = self.args
+        return printable(
             f"{what}: got no Python package '{package}', expected the extra '{extra}'; "
             f"run: pip install 'piezo_hysteresis[{extra}]'"
         )
@@ -133,11 +137,14 @@ class DivergenceError(PiezoError, ArithmeticError):
     """
 
     def __init__(self, effect: str, sample: int, time: float) -> None:
-        super().__init__(
-            f"simulation diverged in '{effect}' at sample {sample} ({time:.6g} s): "
+        super().__init__(effect, sample, time)
+        self.effect, self.sample, self.time = effect, sample, time
+
+    def __str__(self) -> str:
+        return printable(
+            f"simulation diverged in '{self.effect}' at sample {self.sample} ({self.time:.6g} s): "
             "expected a bounded output; check its parameters (stable ARX, beta >= |gamma|) and the drive"
         )
-        self.effect, self.sample, self.time = effect, sample, time
 
 
 class UnknownStateWarning(UserWarning):

@@ -12,7 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Texts of others stand in messages, tables and names as one line that steers no terminal."""
+"""An error is one line, whatever texts of others it contains, and in every process."""
+
+import pickle
 
 import numpy as np
 import pytest
@@ -20,7 +22,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from piezo_hysteresis.cli.main import main
-from piezo_hysteresis.errors import PiezoError, RecordingError, StageError, printable, reason_of
+from piezo_hysteresis.errors import (
+    DeviceError,
+    DivergenceError,
+    IdentificationError,
+    MissingPackageError,
+    PiezoError,
+    RecordingError,
+    StageError,
+    StoppedError,
+    printable,
+    reason_of,
+)
 from piezo_hysteresis.record import Notice, Record
 from piezo_hysteresis.stage.description import Description
 
@@ -39,6 +52,22 @@ def test_any_text_becomes_one_printable_line(text):
 def test_every_error_is_one_printable_line(kind):
     assert str(kind(EVIL)) == printable(EVIL)
     assert reason_of(kind(EVIL)) == printable(EVIL)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        DivergenceError("arx", 10694, 0.21388),
+        MissingPackageError("fleet", "dask", "fleet"),
+        *(kind("said") for kind in (PiezoError, IdentificationError, StageError, DeviceError, StoppedError)),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_an_error_says_the_same_after_its_way_from_a_helper_process(error):
+    arrived = pickle.loads(pickle.dumps(error))
+    assert type(arrived) is type(error)
+    assert str(arrived) == str(error)
+    assert vars(arrived) == vars(error)
 
 
 def test_other_exceptions_are_faults_of_the_program_in_one_line():

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects.extent import Extent
+from ...errors import DivergenceError
 from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.conditioning import select as select_records
@@ -107,7 +108,10 @@ class BaselineSetup:
 
     def is_coarse(self, model: Model) -> bool:
         """Whether the inter-sample error computed with this model differs by more than the floor of a record."""
-        again = intersample_error(model, self.given)
+        try:
+            again = intersample_error(model, self.given)
+        except DivergenceError:  # on a test record, which moves further than those that were fitted
+            return False
         return any(np.std(a - b) > f for a, b, f in zip(again, self.lost, self.least, strict=True))
 
 

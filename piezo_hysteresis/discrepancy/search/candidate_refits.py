@@ -32,8 +32,6 @@ LEAST_GAIN = 0.15
 """Smallest gain in mean ln max(1, R²) for which an effect is accepted."""
 CLOSE = 0.3
 """Largest lag of a rival behind the best candidate, as a share of the best gain."""
-HOPELESS_BESIDE = 0.6
-"""The same for a further refit if the best candidate has reached the floor."""
 AGAIN = 3
 """Number of refits that are repeated with newly estimated dynamics."""
 RESTARTS = 4
@@ -115,9 +113,8 @@ def _anew(candidate: FittedCandidate) -> FittedCandidate:
 
 
 def _is_far_behind(candidate: Candidate, best: FittedCandidate, before: Score) -> bool:
-    """Whether the best candidate is at the floor and the other one so far above it that it is not a rival."""
-    most = 2.0 * LEAST_GAIN if best.score.cost <= LEAST_GAIN else HOPELESS_BESIDE * (before.cost - best.score.cost)
-    return best.score.excess <= ADEQUATE and candidate.score.cost - best.score.cost > most
+    """Whether the best candidate is at the floor and the other one is no rival."""
+    return best.score.excess <= ADEQUATE and not _is_close(candidate, best, before)
 
 
 def _is_close(candidate: Candidate, best: FittedCandidate, before: Score) -> bool:
