@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The linear part of a model without broadband records: a delay, a lightly damped mode, a pole."""
+"""The linear part of a model without broadband records: a delay, a lightly damped mode, a pole, or ARX of order 3."""
 
 from __future__ import annotations
 
@@ -26,12 +26,14 @@ from ...record import Notice
 from ..records.excitation_content import excitation_content
 from .piece_fit import DELAY, GAIN, POLE, PieceFit, fit_pieces
 from .pieces import Kind, RecordPiece
-from .ringing import RESOLVED, SLOWEST, ringing_frequency
+from .ringing import RESOLVED, SLOWEST, decay_after_steps, ringing_frequency
 
 LAGS = (0.3, 1.5, 4.0)
 """Start values of the delay [samples]."""
 RINGING_STAYS = 0.7
 """A mode is accepted if at most this share of the power after a step remains."""
+DESCRIBED = 0.1
+"""Two more orders of the ARX dynamics are accepted if at most this share of the power after a step remains."""
 POLE_GAINS = 0.98
 """A pole is accepted if at most this share of the cost remains."""
 SILENT_GAINS = 0.8
@@ -65,7 +67,7 @@ def fit_structure(
 
 
 def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> tuple[PieceFit, float]:
-    """Fit a delay; then a mode, if the stage rings or its gain rises with frequency; then a pole, if it helps.
+    """Fit a delay; a mode, if the stage rings or its gain rises with frequency; a pole; two more orders, if they help.
 
     Parameters
     ----------
@@ -87,7 +89,7 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     plain = min(found, key=lambda f: f.cost)
     best = _with_mode(plain, pieces, floors)
     held = held_by(best)
-    lead = float(np.log(plain.cost / best.cost)) if set(SHAPE) & set(best.names) else 0.0
+    ringing = best
     poles = []
     for pole in (0.3, 0.8):
         arx = Arx(a=(-pole,), b=(1.0 - pole,), delay=best.model[Arx.name]["delay"])
@@ -95,7 +97,29 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
         if tried.model.values()[POLE] < 0.0:
             poles.append(tried)
     lagging = min(poles, key=lambda f: f.cost, default=best)
-    return (lagging if lagging.cost < POLE_GAINS * best.cost else best), lead
+    best = _with_two_more_orders(plain, lagging if lagging.cost < POLE_GAINS * best.cost else best, pieces, floors)
+    rings = set(SHAPE) <= set(best.names)
+    return best, float(np.log(plain.cost / ringing.cost)) if rings else 0.0
+
+
+def _with_two_more_orders(
+    plain: PieceFit, best: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]
+) -> PieceFit:
+    """The fit with ARX of two more orders if it describes the response to the steps, else `best`.
+
+    A mode above half the sampling rate rings from sample to sample. The fit begins with a pair of poles that explains
+    the residual after the steps and a pair of equal zeros, which is the response of the fit before.
+    """
+    before = plain if ExtraResonance.name in best.model else best
+    decay = decay_after_steps(before.model, pieces)
+    if decay is None:
+        return best
+    arx = before.model[Arx.name]
+    a, b = (np.convolve(c, decay).tolist() for c in ((1.0, *arx.array("a")), arx.array("b")))
+    richer = Arx(a=tuple(a[1:]), b=tuple(b), delay=arx["delay"])
+    found = fit_structure(before.model.with_effect(richer), pieces, floors)
+    describes = _behind_steps(found, pieces) < DESCRIBED * _behind_steps(before, pieces)
+    return found if describes and found.cost < best.cost else best
 
 
 def held_by(fit: PieceFit) -> tuple[str, ...]:
@@ -105,6 +129,10 @@ def held_by(fit: PieceFit) -> tuple[str, ...]:
 
 def mode_notices(fit: PieceFit) -> list[Notice]:
     """``ringing`` with the fitted numbers of the mode, if there is one; one that rings has all numbers free."""
+    order = fit.model[Arx.name].array("a").size
+    if order > 1:
+        said = f"after a step the stage rings faster than half of the sampling rate; ARX of order {order} describes it"
+        return [Notice("ringing", said)]
     if ExtraResonance.name not in fit.model:
         return []
     mode = fit.model[ExtraResonance.name]

@@ -119,7 +119,7 @@ class PieceFit:
         now = np.array([values[n] for n in self.names])
         zeros = np.full(self.matrices.shape[1] - 1 - now.size, np.inf)
         lower, upper = bounds_of(self.model, self.names)
-        if POLE in self.names:
+        if POLE in self.names and self.model[Arx.name].array("a").size == 1:
             pole = self.names.index(POLE)
             lower[pole], upper[pole] = -LARGEST_POLE, 0.0
         return np.concatenate((lower - now, -zeros)), np.concatenate((upper - now, zeros))

@@ -12,17 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The frequency at which a stage rings after a step, from the residual of a model without a mode."""
+"""How a stage rings after a step, from the residual of a model without a mode: its frequency, or its decay."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...effects import ExtraResonance
 from ...model.model import Model
 from .pieces import Kind, RecordPiece
+
+Array = NDArray[np.float64]
 
 CYCLES = 4.0
 """Smallest number of cycles in the piece after the step."""
@@ -30,6 +33,12 @@ RESOLVED = 0.45
 """Highest frequency [cycles per sample]; a faster mode acts as a lag."""
 SLOWEST = next(p.lower for p in ExtraResonance.parameters if p.name == "f0")
 """Lowest frequency of a mode [Hz]."""
+ECHO = 40
+"""Number of samples after a step from which the decay is estimated; their second half shows where it ends."""
+FEWEST = 12
+"""Smallest number of such samples."""
+LONGEST = 0.95
+"""Largest radius of the poles of a decay; a longer one is the work of a mode that the samples show, or creep."""
 STANDS_OUT = 10.0
 """Smallest ratio of the highest spectral line to the median of the spectrum, in power."""
 
@@ -66,3 +75,29 @@ def ringing_frequency(model: Model, pieces: Sequence[RecordPiece]) -> float | No
         if height > STANDS_OUT and (best is None or height > best[0]):
             best = (height, float(frequency[top]))
     return None if best is None else best[1]
+
+
+def decay_after_steps(model: Model, pieces: Sequence[RecordPiece]) -> Array | None:
+    """Coefficients (1, a₁, a₂) of the linear prediction of the residual after steps; None if it does not decay.
+
+    e_k + a₁ e_{k−1} + a₂ e_{k−2} = 0 holds for a mode of any frequency, also for one above half the sampling rate
+    (Prony 1795; Hildebrand, Introduction to Numerical Analysis, Sec. 9.4).
+
+    Parameters
+    ----------
+    model : Model
+        Model without a mode.
+    pieces : sequence of RecordPiece
+        Pieces in order.
+    """
+    echoes = []
+    for y, piece in zip(model.free_run([p.record for p in pieces]), pieces, strict=True):
+        if piece.kind is Kind.STEP and piece.record.size >= FEWEST:
+            e = (piece.record.displacement - y)[:ECHO]
+            echoes.append(e - e[e.size // 2 :].mean())
+    if not echoes:
+        return None
+    before = np.concatenate([np.column_stack((e[1:-1], e[:-2])) for e in echoes])
+    after = np.concatenate([e[2:] for e in echoes])
+    decay = np.append(1.0, -np.linalg.lstsq(before, after, rcond=None)[0])
+    return decay if np.abs(np.roots(decay)).max(initial=0.0) < LONGEST else None

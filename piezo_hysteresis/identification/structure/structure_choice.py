@@ -17,7 +17,7 @@
 Relaxations and weights without bounds fit the data better, but their predictions are much worse. Therefore only
 bounded effects are offered: play operators with weights that are not negative, or the state of a hysteresis operator;
 the cube and the square of the drive; logarithmic creep with one rate or two; weights that depend on the level; a delay,
-one pole and one lightly damped mode.
+one pole and one lightly damped mode, or ARX of higher order where a step shows it.
 """
 
 from __future__ import annotations
