@@ -36,6 +36,8 @@ FINER = 8
 """Approximate number of steps of the plant per sample."""
 TURN = 0.3
 """Time at which creep turns from its fast rate to its slow one [s]."""
+RINGS = 1.0
+"""Time after which no stage rings any more [s]."""
 DRIFT = 10.0
 """Time in which a stage drifts by `drift` [s]."""
 PER_DECADE = 6
@@ -158,6 +160,17 @@ class Nanopositioner:
         rates = (self.creep_fast * (1.0 - share) + self.creep_slow * share) / PER_DECADE
         early = float(rates @ (1.0 - np.exp(-0.1 / taus)))
         return np.asarray((1.0 - early) * w + elements(w, dt, taus, rates))
+
+    def sampled_lag(self, period: float) -> float:
+        """Group delay of the samples at low frequency [s], with that of the converter: Σ (1 − s_k) of the step s.
+
+        A mode near a multiple of the sampling rate resonates with the steps of the converter, so that the samples have
+        another lag than that of the stage and half a sample.
+        """
+        alone = {"loop": 0.0, "bend": 0.0, "cubic": 0.0, "square": 0.0, "creep_fast": 0.0, "creep_slow": 0.0}
+        linear = replace(self, zero=0.0, noise=0.0, softening=0.0, drift=0.0, **alone)
+        response = linear.play(np.full(round(RINGS / period), self.volt), period).displacement
+        return float(period * np.sum(1.0 - response / response[-1]))
 
     def _mechanics(self, w: Array, dt: float) -> Array:
         o = 2.0 * np.pi * self.mode

@@ -88,8 +88,9 @@ class PreisachStage(Nanopositioner):
         density = np.exp(-0.5 * (np.log(half / usual) / spread) ** 2) / (half + 0.02)
         density *= np.exp(-(((level - rng.uniform(0.2, 0.8)) / rng.uniform(0.4, 1.0)) ** 2))
         density /= density[down >= 0.0].sum()
-        held = relays(v, up, down, density)
-        return np.asarray((1.0 - self.loop) * v + self.square * v**2 + self.cubic * v**3 + self.loop * (held - held[0]))
+        rest, *held = relays(np.append(0.0, v), up, down, density)
+        held = np.array(held) - rest
+        return np.asarray((1.0 - self.loop) * v + self.square * v**2 + self.cubic * v**3 + self.loop * held)
 
 
 def waves(

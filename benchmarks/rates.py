@@ -82,15 +82,13 @@ def cases() -> Iterator[tuple[str, tuple[float, ...], tuple[float, ...], tuple[f
 
 
 def lag_holds(found: Identification, stage: Nanopositioner) -> bool:
-    """Whether the 95 % interval of the lag of pole and delay, with half a sample for the converter, holds the truth."""
+    """Whether the 95 % interval of the lag of delay, mode and dynamics holds that of the samples of the stage."""
     value, error = lag(found.fit)
     model = found.model
     if ExtraResonance.name in model:
         mode = model[ExtraResonance.name]
         value += mode["r"] * 2.0 * mode["zeta"] / (2.0 * np.pi * mode["f0"])
-    ringing = 2.0 * stage.zeta / (2.0 * np.pi * stage.mode)
-    true = stage.delay + stage.pole + ringing + 0.5 * PERIOD
-    return abs(value - true) < 1.96 * error
+    return abs(value - stage.sampled_lag(PERIOD)) < 1.96 * error
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
