@@ -24,6 +24,7 @@ import numpy as np
 from ..effects import Effect
 from ..errors import IdentificationError
 from ..identification.fit.fit import Progress
+from ..identification.fit.form_uncertainty import PIECES
 from ..model.model import Model
 from ..record import CONDITIONING, Experiment, Record
 from .residual.localise import ResidualShare
@@ -74,9 +75,10 @@ class DiagnosisState:
 
     @property
     def usable(self) -> list[int]:
-        """Indices of the records that may be compared with a model."""
+        """Indices of the records that may be compared with a model, and have as many samples as a record counts."""
         informative = [i for i, r in enumerate(self.experiment) if r.phase not in IDLE]
-        return [i for i in informative if not self.experiment[i].truncated] or informative
+        whole = [i for i in informative if not self.experiment[i].truncated]
+        return [i for i in whole if self.experiment[i].size >= PIECES] or whole or informative
 
     @property
     def moving(self) -> list[int]:

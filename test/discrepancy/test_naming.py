@@ -25,7 +25,8 @@ from benchmarks.coverage import truth_of
 from benchmarks.naming_cases import UNKNOWN, Case
 from benchmarks.naming_experiments import ProtocolVariant
 from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
-from piezo_hysteresis.effects import BY_NAME
+from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
+from piezo_hysteresis.effects import BY_NAME, CATALOGUE
 from piezo_hysteresis.errors import IdentificationError, ParameterError
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.identification.protocol.protocol import short
@@ -152,6 +153,13 @@ def triangle(records):
     t = 1e-3 * np.arange(2000)
     u = 4 * np.abs((t % 1) * 2 - 1)
     return tuple(Record(u, 1e-6 * u, 1e-3, phase="triangle") for _ in range(records))
+
+
+def test_a_record_of_few_samples_is_not_compared_with_a_model():
+    u = np.array([0.0, 1.0, 3.0])
+    few = Record(u, 2e-6 * u, 1e-3, phase="step")
+    assert DiagnosisState(Experiment((*triangle(2), few)), None, CATALOGUE, print).usable == [0, 1]
+    assert DiagnosisState(Experiment((few,)), None, CATALOGUE, print).usable == [0]
 
 
 def test_one_phase_is_not_enough_for_a_verdict():

@@ -33,12 +33,14 @@ Array = NDArray[np.float64]
 
 PARTS = 16
 """Largest number of parts into which a sample is divided."""
-MUST_FALL = 0.94
-"""Largest share of the squared second differences times the variance of a residual that a correction may leave."""
+SMOOTHER = 0.97
+"""Largest share of the squared second differences, or of the square, of a residual that a correction may leave."""
 KINKED = 3.0
 """Ratio of a second difference of the drive to those three samples before and after from which it is a kink."""
 TINY = 1e-12
 """Share of the drive range below which the drive counts as constant, and shortest ramp as a share of a sample."""
+ITS_SIZE = (0.7, 1.3)
+"""Range of the fitted factor of a correction that explains the residual (ideal: 1)."""
 
 
 def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
@@ -46,8 +48,9 @@ def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
 
     Averages do not show whether a drive ramped or jumped to the next level. The displacement decides this for every
     record, because a wrong choice gives large residuals in single samples. A slow record also does not show the ringing
-    after a turn. No correction is made if the residual is not clearly smoother and smaller with it. Relaxations that
-    are slower than one sample are visible in the samples, and are left out of G.
+    after a turn. No correction is made if it does not stand out in single samples and the residual does not contain it
+    in the right size, because it may then result from inaccurate dynamics. Relaxations that are slower than one sample
+    are visible in the samples, and are left out of G.
 
     Parameters
     ----------
@@ -87,8 +90,19 @@ def chosen_correction(residual: Array, gradual: Array, abrupt: Array) -> Array:
     gradual, abrupt : (n,) ndarray
         Corrections for a drive that ramps, and for a drive that jumps, within a sample [m].
     """
-    change = min((gradual, abrupt), key=lambda c: _roughness(residual - c))
-    return change if _roughness(residual - change) < MUST_FALL * _roughness(residual) else np.zeros_like(change)
+    change = min((gradual, abrupt), key=lambda c: _unevenness(residual - c) * np.var(residual - c))
+    smoother = _unevenness(residual - change) < SMOOTHER * _unevenness(residual)
+    return change if smoother or _holds(residual, change) else np.zeros_like(change)
+
+
+def _holds(residual: Array, change: Array) -> bool:
+    """Whether the residual contains the correction in its size, and is much smaller without it."""
+    residual, change = residual - residual.mean(), change - change.mean()
+    power, size = float(residual @ residual), float(change @ change)
+    if size == 0.0:
+        return False
+    left = residual - change
+    return bool(ITS_SIZE[0] < residual @ change / size < ITS_SIZE[1] and left @ left < SMOOTHER * power)
 
 
 def _turns_sharply(record: Record) -> bool:
@@ -99,9 +113,8 @@ def _turns_sharply(record: Record) -> bool:
     return bool(np.any((bends[3:-3] > KINKED * around) & (bends[3:-3] > 0.5 * bends.max())))
 
 
-def _roughness(residual: Array) -> float:
-    """Sum of the squared second differences, times the variance."""
-    return float(np.sum(np.diff(residual, 2) ** 2) * np.var(residual))
+def _unevenness(residual: Array) -> float:
+    return float(np.sum(np.diff(residual, 2) ** 2))
 
 
 def _sharpened(record: Record, parts: int, abrupt: bool) -> Record:
