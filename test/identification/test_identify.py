@@ -256,6 +256,14 @@ def test_a_binary_drive_alone_is_identified(levels):
     assert identify(record, memory=True).free_run_percent < 0.3
 
 
+@pytest.mark.parametrize("mode", [300.0, 400.0, 532.0])
+def test_a_binary_drive_faster_than_the_ringing_predicts_another_one(mode):
+    """The fit of high orders does not converge, because two levels leave the loop open; low orders do not ring."""
+    stage, random = Nanopositioner(mode=mode), np.random.default_rng(1)
+    first, second = (stage.play(np.repeat(random.choice([2.0, 8.0], n), 10), 5e-4, "noise") for n in (200, 100))
+    assert percent(identify(first).model, [second]) < 0.3
+
+
 def test_phases_that_are_held_out_must_exist():
     experiment = Experiment(tuple(play(triangle())))
     with pytest.raises(RecordError, match="got phase 'sine', expected some of triangle"):

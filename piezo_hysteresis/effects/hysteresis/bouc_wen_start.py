@@ -40,6 +40,9 @@ RATIOS = np.linspace(-0.9, 0.9, 7)
 """Grid of γ·sgn(A)/β; |γ| ≤ β keeps the loop bounded."""
 LOCAL_SEARCHES = 3
 """Largest number of grid points from which a local search starts."""
+ALIKE = 1e-3
+"""Singular value below which terms count as the same. On a drive of two levels v³, v and g are nearly equal, and noise
+would give them large coefficients that cancel each other."""
 LARGEST_COST = 10.0
 """A local search starts only from grid points whose cost is below this multiple of the smallest cost."""
 
@@ -78,7 +81,7 @@ class _Search:
         g = self._stack(_state(self.loops, beta, ratio * beta))
         matrix = np.column_stack((self.fixed, g))
         scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
-        theta = np.linalg.lstsq(matrix / scale, self.target, rcond=1e-10)[0] / scale
+        theta = np.linalg.lstsq(matrix / scale, self.target, rcond=ALIKE)[0] / scale
         return theta, self.target - matrix @ theta
 
 

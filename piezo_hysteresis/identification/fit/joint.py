@@ -33,6 +33,8 @@ from .normal_equations import Nuisance, residuals
 
 SLOWEST_POLE = 0.1
 """Longest time constant of G, as a share of the longest record; slower poles describe drift."""
+MUCH_CLOSER = 0.5
+"""Ratio of costs below which a fit that has not converged is preferred to one of lower order that has."""
 NEAR = 1e-7
 """Damping of a fit that starts from a linear one; more damping only slows down weak directions."""
 
@@ -141,11 +143,15 @@ def fit_dynamics(
     for order in _ladder(orders):
         start, dynamics = _start(model, records, floors, broadband, delay, order)
         joint = fit_joint(start, records, floors, fitted, progress)
+        tried.append((joint, dynamics))
         if joint.converged and _slowest(joint.model) < SLOWEST_POLE * longest:
             break
-        tried.append((joint, dynamics))
     else:
         joint, dynamics = min(tried, key=lambda outcome: outcome[0].cost)
+    settled = [t for t in tried if _slowest(t[0].model) < SLOWEST_POLE * longest]
+    closest = min(settled, key=lambda outcome: outcome[0].cost, default=tried[-1])
+    if closest[0].cost < MUCH_CLOSER * joint.cost:
+        joint, dynamics = closest
     used = dynamics_of(joint.model)
     reached = used.array("a").size, used.array("b").size
     notices = dynamics.notices
