@@ -132,7 +132,7 @@ def fit_dynamics(
     Returns
     -------
     joint : Fit
-        The first fit that the data determine, otherwise the best one.
+        The first fit that the data determine, unless one of higher order is much closer; otherwise the closest one.
     dynamics : Dynamics
         ARX model from w at the start.
     notices : tuple of Notice
