@@ -108,9 +108,13 @@ def _with_two_more_orders(
     """The fit with ARX of two more orders if it describes the response to the steps, else `best`.
 
     A mode above half the sampling rate rings from sample to sample. The fit begins with a pair of poles that explains
-    the residual after the steps and a pair of equal zeros, which is the response of the fit before.
+    the residual after the steps and a pair of equal zeros, which is the response of the fit before. A mode of the whole
+    stage stays.
     """
-    before = plain if ExtraResonance.name in best.model else best
+    has_mode = ExtraResonance.name in best.model
+    if has_mode and abs(best.model.values()[SHARE] - 1.0) <= WHOLE:
+        return best
+    before = plain if has_mode else best
     decay = decay_after_steps(before.model, pieces)
     if decay is None:
         return best
