@@ -126,7 +126,10 @@ def read(
     notices: list[Notice] = []
     for path in paths:
         place = Path(path).expanduser()
-        found = with_rows_before(partial(_parts, place, _format(place, format)), options, rows_before)
+        chosen = _format(place, format)
+        if axis is not None and not isinstance(chosen, Rosbag2):
+            raise RecordingError(f"{path}: `axis`: got '{axis}', expected none; only a bag has namespaces of stages")
+        found = with_rows_before(partial(_parts, place, chosen), options, rows_before)
         factors = load_decimation(place) if decimate is None else decimate
         by_record = [(r, factors.get(r.phase, factors.get(r.phase.split("_")[0]))) for r in found]
         records += [r if factor is None else r.decimate(factor) for r, factor in by_record]

@@ -25,6 +25,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from piezo_hysteresis.errors import RecordingError
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import read, write
 
@@ -229,3 +230,13 @@ def test_a_third_axis_of_a_foreign_table_is_named_by_a_column(tmp_path):
     )
     (got,) = read(tmp_path / "t.csv", columns={"displacement_3": "Axis 3 [nm]"}, phases="x")
     np.testing.assert_allclose(got.channels["displacement_3"], rows[:, 3] * 1e-9, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["folder", "table.csv", "matlab.mat"])
+def test_options_that_would_have_no_effect_are_refused(tmp_path, name):
+    path = tmp_path / name
+    write(Experiment((Record(np.arange(20.0), 1e-6 * np.arange(20.0), 1e-3, "step"),)), path)
+    with pytest.raises(RecordingError, match="`axis`: got '/stage_x', expected none; only a bag has namespaces"):
+        read(path, axis="/stage_x")
+    with pytest.raises(RecordingError, match="`include`: got 'rest', expected some of idle, hold"):
+        read(path, include=("rest",))

@@ -27,11 +27,8 @@ from ..segmentation.decimating_buffer import averaged_notice
 from ..segmentation.phases import labelled
 from ..segmentation.segment import Segment
 from ..segmentation.waveform import phase_name
-from ..table.read_options import ReadOptions
+from ..table.read_options import HOLD, IDLE, LEFT_OUT, ReadOptions
 from .phase_topic import PhaseNames
-
-IDLE, HOLD = "idle", "hold"
-"""Names of the time before the first and after every phase; left out unless `ReadOptions.include` names them."""
 
 _MOVED = 0.01
 """Share of the largest movement below which a segment counts as rest."""
@@ -72,7 +69,7 @@ def records_of(
         slow = segment.averaged(average)
         name = "record" if unlabelled else _name(slow if slow.size else segment, names, notices)
         moves = _travel(segment) > moving
-        left_out = name in (IDLE, HOLD) and name not in options.include and not (name == HOLD and moves and kept)
+        left_out = name in LEFT_OUT and name not in options.include and not (name == HOLD and moves and kept)
         if missing := segment.lost + sum(segment.breaks.values()):
             lost = f"{missing} samples ({missing * segment.sample_period:.3g} s) were lost"
             places = len(segment.breaks) + (segment.lost > 0)

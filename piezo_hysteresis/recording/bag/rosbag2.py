@@ -26,13 +26,13 @@ from ...errors import RecordingError
 from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import shared_averages
-from ..table.read_options import ReadOptions
+from ..table.read_options import IDLE, ReadOptions
 from .bag import STORAGES, Bag
 from .bag_writer import BagWriter
 from .block_message import TYPE, BlockMessage, typestore
 from .foreign_topics import read_topics
 from .phase_topic import STRING, PhaseNames
-from .recorded_phases import IDLE, records_of
+from .recorded_phases import records_of
 from .sample_stream import SampleStream
 
 _BLOCK_DURATION = 0.01

@@ -36,6 +36,9 @@ LONGEST_PERIOD = 60.0
 LABELS = ("phase", "record", "continues", "truncated", "initial_voltage", "sample_period", "start_time")
 """Properties that are constant within a record."""
 
+LEFT_OUT = IDLE, HOLD = ("idle", "hold")
+"""Names of the time before the first and after every phase of a bag; left out unless `ReadOptions.include` has them."""
+
 Column = str | int
 """Title or name of a column, or its number from 1."""
 
@@ -110,6 +113,8 @@ class ReadOptions:
                 f"`sample_period`: got {given:g} s, expected at most {LONGEST_PERIOD:g} s between two samples; "
                 f"if {given:g} Hz is the sample rate, give {1.0 / given:.6g}"
             )
+        if unknown := [name for name in self.include if name not in LEFT_OUT]:
+            raise RecordingError(f"`include`: got '{unknown[0]}', expected some of {', '.join(LEFT_OUT)}")
         if self.initial_voltage is not None and not math.isfinite(self.initial_voltage):
             raise RecordingError(f"`initial_voltage`: got {self.initial_voltage!r} V, expected a finite voltage")
         if self.average is not None and self.average < 1:
