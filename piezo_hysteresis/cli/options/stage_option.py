@@ -36,7 +36,7 @@ from ...report.tables.probability_table import probability_table
 from ...stage.back_ends import BACK_ENDS
 from ...yaml_file import read_yaml
 from ..stage.record import checked_settings, drive_limits, read_stage
-from ..stage.safe_session import safe_session
+from ..stage.safe_session import safe_session, uninterrupted
 from ..terminal import console, progress, show
 from .destination import require_new_experiment
 from .whole_number import whole_number
@@ -108,7 +108,8 @@ def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
                     console().print(f"{live.updates[-1].time:6.1f} s: {live.updates[-1].sentence()}", highlight=False)
     finally:
         if records:
-            recording.write(Experiment(tuple(records)), args.output)
+            with uninterrupted():
+                recording.write(Experiment(tuple(records)), args.output)
             console().print(f"wrote {len(records)} phases to {args.output}")
     show(probability_table(live.answer()))
     return live

@@ -39,7 +39,7 @@ from ...yaml_file import read_yaml
 from ..options.destination import require_new_experiment
 from ..options.whole_number import whole_number
 from ..terminal import console, progress
-from .safe_session import safe_session
+from .safe_session import safe_session, uninterrupted
 from .simulate import PROTOCOLS
 
 
@@ -96,7 +96,8 @@ def _write(phases: list[list[Record]], output: str) -> str:
     records = [record for phase in phases for record in phase]
     if not records:
         return "nothing was written"
-    recording.write(Experiment(tuple(records)), output)
+    with uninterrupted():
+        recording.write(Experiment(tuple(records)), output)
     return f"wrote {len(records)} records of {len(phases)} complete phases to {output}"
 
 

@@ -66,3 +66,14 @@ def safe_session(settings: DriverSettings, values: Mapping[str, Any], place: str
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Ignore `_SIGNALS` in the block: while a recording is written, another one must not lose it."""
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in _SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

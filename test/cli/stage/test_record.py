@@ -128,6 +128,26 @@ def test_ctrl_c_brings_the_stage_to_safety_with_a_message(piezo, tmp_path, monke
     assert not folder.exists()
 
 
+def test_another_ctrl_c_does_not_lose_the_phases_that_are_written(piezo, tmp_path, monkeypatch):
+    file, folder = tmp_path / "stage.yaml", tmp_path / "experiment"
+    file.write_text(STAGE.format(memory="false"))
+    write = recording.write
+
+    def interrupted(session, phases, progress, keep):
+        return record_phases(session, phases, lambda name: name == "noise" and signal.raise_signal(signal.SIGINT), keep)
+
+    def interrupted_again(*arguments):
+        signal.raise_signal(signal.SIGINT)
+        write(*arguments)
+
+    monkeypatch.setattr(record, "record_phases", interrupted)
+    monkeypatch.setattr(recording, "write", interrupted_again)
+    done = piezo("record", file, "short", "-o", folder)
+    assert done.status == 130
+    assert f"complete phases to {folder}" in done.err.replace("\n", "")
+    assert recording.read(folder)[0].phase == "conditioning"
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_more_signals_on_the_way_to_safety_are_ignored(piezo, tmp_path, monkeypatch, number):
     file = tmp_path / "stage.yaml"
