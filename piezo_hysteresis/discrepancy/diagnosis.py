@@ -177,7 +177,12 @@ class Diagnosis(Pictured):
             "rejected": [{"name": r.name, "reason": r.reason} for r in self.rejected],
             "next_experiment": None
             if (following := self.next_experiment) is None
-            else {"phase": following.drive, "separates": list(following.rivals), **following.numbers()},
+            else {
+                "phase": following.drive,
+                "separates": list(following.rivals),
+                "reason": following.sentence(),
+                **following.numbers(),
+            },
             "data_quality": [
                 {"kind": n.kind, "phase": n.phase, "message": n.message, "severe": n.severe}
                 for n in self.experiment.notices

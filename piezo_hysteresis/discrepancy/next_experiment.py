@@ -52,10 +52,11 @@ def best_next_experiment(selection: Selection, training_data: TrainingData) -> S
 
 
 def possible_drives(training_data: TrainingData) -> tuple[ProtocolPhase, ...]:
-    """The drives of a live diagnosis, inside the recorded voltage range; each begins at its lower end."""
-    extent = training_data.extent
+    """The drives of a live diagnosis inside the recorded range and slew rate of the voltage, from its lower end."""
+    extent, records = training_data.extent, training_data.records
     low, high = extent.voltage_min, extent.voltage_max
-    period = min(r.sample_period for r in training_data.records)
-    limits = DriveLimits(period * math.ceil(FINEST / period), low, high, low, np.inf, extent.span)
+    period = min(r.sample_period for r in records)
+    steepest = max(float(np.max(np.abs(np.diff(r.voltage)), initial=0.0)) / r.sample_period for r in records)
+    limits = DriveLimits(period * math.ceil(FINEST / period), low, high, low, steepest, min(steepest, extent.span))
     drives = (*(p for tier in tiers(limits) for p in tier.phases), *spare_drives(limits))
     return tuple(d for d in drives if d.name != CONDITIONING)

@@ -171,9 +171,5 @@ def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
         found.append(correction["reason"])
     following = answer.get("next_experiment")
     if following:
-        apart = dict.fromkeys(n.replace("_", " ") for n in following.get("separates", ()))
-        names = " from ".join(apart) if len(apart) > 1 else ""
-        found.append(
-            f"To learn more, record the phase “{following['phase']}”" + (f": it separates {names}." if names else ".")
-        )
+        found.append(following.get("reason") or f"To learn more, record the phase “{following['phase']}”.")
     return tuple(found)

@@ -80,8 +80,10 @@ def test_the_proposed_drive_separates_the_rivals_inside_the_recorded_range(perio
     assert {*found.rivals} == {"creep", "thermal_drift"}
     assert found.drive in {d.name for d in possible_drives(data)}
     recorded = data.records[0].voltage
+    steepest = np.abs(np.diff(recorded)).max() / period
     for drive in possible_drives(data):
         assert recorded.min() <= drive.voltage.min() <= drive.voltage.max() <= recorded.max()
+        assert drive.largest_slew <= steepest * (1 + 1e-6)
 
 
 def test_equal_rivals_are_told_that_no_drive_decides():
