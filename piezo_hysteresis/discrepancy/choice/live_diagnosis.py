@@ -36,8 +36,8 @@ from .update import End, Update, percent
 
 MOST_RIVALS = 3
 """Largest number of rivals for which a drive is chosen; with more rivals the fixed order continues."""
-
-
+DETOUR = 0.1
+"""Stage time of chosen drives before the last tier, as a share of that of all tiers; a wrong choice costs no more."""
 MOST_CHOSEN = 4
 """Largest number of consecutive chosen drives. If none of them decides, the prediction of their results is wrong."""
 
@@ -175,6 +175,16 @@ class LiveDiagnosis:
             },
         }
 
+    @property
+    def _whole(self) -> float:
+        """Stage time of all tiers [s]."""
+        return sum(tier.duration for tier in self.plan)
+
+    @property
+    def _detour(self) -> float:
+        """Stage time of the chosen drives so far [s]."""
+        return self.time - sum(tier.duration for tier in self.plan[: self.tier])
+
     def _left(self) -> tuple[Tier, ...]:
         """Tiers that were not played yet and fit into the remaining time."""
         left = self.plan[self.tier :]
@@ -209,7 +219,7 @@ class LiveDiagnosis:
             chosen = best_drive(rivals, drives, missing_log_odds(likely, self.error_rate), self.longest - self.time)
             if chosen is not None:
                 phases, separation = chosen
-                if separation.decides and (not left or separation.duration <= left[0].duration):
+                if separation.decides and (not left or self._detour + separation.duration <= DETOUR * self._whole):
                     name = f"{separation.drive}, to separate {' from '.join(separation.rivals)}"
                     return replace(self, due=phases, due_name=name, separation=separation, chosen=self.chosen + 1)
         if left:
