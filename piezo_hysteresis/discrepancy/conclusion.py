@@ -29,10 +29,15 @@ from .gap import Gap, measure_gap, with_stated_error
 from .next_experiment import best_next_experiment
 from .residual.localise import ResidualShare
 from .search.baseline_setup import BaselineSetup
-from .search.refit import LAST, PRECISE, joint
+from .search.refit import LAST, PRECISE, joint, restart
 from .search.selection_result import Selection
+from .search.training_data import TrainingData
 from .unnamed.offer import best_correction
 from .verdict import conclusion_of, is_explained
+
+NOISY, WORTHWHILE = 1.1, 0.95
+"""Ratio of the cost to the cost of noise above which the last fit is restarted, and largest ratio of the new cost to
+the old one for which the new fit is kept and tested again."""
 
 
 def concluded(
@@ -64,7 +69,7 @@ def concluded(
     plain = selection.baseline if selection.accepted else selection.model  # the search may have found better dynamics
     first = joint(plain, replace(training_data, records=whole), LAST, PRECISE)
     final_training_data = selection.accepted[-1].best.training_data if named else training_data
-    final = joint(selection.model, replace(final_training_data, records=whole), LAST, PRECISE) if named else first
+    final = _finished(selection, replace(final_training_data, records=whole), setup.null) if named else first
     chosen = setup.test_records or tuple(setup.fitted)
 
     def gap_of(last: Fit, nuisance: Nuisance) -> Gap:
@@ -102,3 +107,15 @@ def concluded(
         experiment=experiment.noting(*missing_excitation([records[i] for i in setup.usable], found)),
         correction=best_correction(final.model, setup, selection.null) if is_unexplained else None,
     )
+
+
+def _finished(selection: Selection, training_data: TrainingData, null: float) -> Fit:
+    """The last fit, to all samples; restarted with newly estimated dynamics while this reduces the cost."""
+    final = joint(selection.model, training_data, LAST, PRECISE)
+    last = selection.accepted[-1].best
+    while final.cost > NOISY * null:
+        anew = restart(replace(last, effect=final.model[last.name], training_data=training_data, fit=final), LAST).fit
+        if anew.cost > WORTHWHILE * final.cost:
+            break
+        final = anew
+    return final
