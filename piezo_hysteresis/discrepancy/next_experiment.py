@@ -56,7 +56,9 @@ def possible_drives(training_data: TrainingData) -> tuple[ProtocolPhase, ...]:
     extent, records = training_data.extent, training_data.records
     low, high = extent.voltage_min, extent.voltage_max
     period = min(r.sample_period for r in records)
-    steepest = max(float(np.max(np.abs(np.diff(r.voltage)), initial=0.0)) / r.sample_period for r in records)
+    before = [r.voltage[0] if r.continues else r.settled_voltage for r in records]  # a jump may be the first sample
+    steps = [np.diff(r.voltage, prepend=v) / r.sample_period for r, v in zip(records, before, strict=True)]
+    steepest = max(float(np.abs(s).max()) for s in steps)
     limits = DriveLimits(period * math.ceil(FINEST / period), low, high, low, steepest, min(steepest, extent.span))
     drives = (*(p for tier in tiers(limits) for p in tier.phases), *spare_drives(limits))
     return tuple(d for d in drives if d.name != CONDITIONING)

@@ -14,6 +14,8 @@
 
 """The drive that separates two models, and the one that is proposed after a diagnosis."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -93,3 +95,10 @@ def test_equal_rivals_are_told_that_no_drive_decides():
     found = best_next_experiment(selection, data)
     assert not found.decides
     assert found.expected_z == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_jump_in_the_first_sample_is_a_recorded_slew_rate():
+    held = Record(np.full(100, 4.0), np.zeros(100), 1e-3, initial_voltage=1.0)
+    extent = replace(Extent.of((held,), 10.0, 1e-5), voltage_min=1.0, voltage_max=4.0)
+    drives = possible_drives(TrainingData((held,), np.array([5e-9]), Nuisance(), extent))
+    assert max(d.largest_slew for d in drives) <= 3.0 / 1e-3 * (1 + 1e-6)
