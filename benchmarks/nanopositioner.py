@@ -167,8 +167,8 @@ class Nanopositioner:
         A mode near a multiple of the sampling rate resonates with the steps of the converter, so that the samples have
         another lag than that of the stage and half a sample.
         """
-        alone = {"loop": 0.0, "bend": 0.0, "cubic": 0.0, "square": 0.0, "creep_fast": 0.0, "creep_slow": 0.0}
-        linear = replace(self, zero=0.0, noise=0.0, softening=0.0, drift=0.0, **alone)
+        exact = replace(self, zero=0.0, noise=0.0, softening=0.0, drift=0.0)
+        linear = replace(exact, loop=0.0, bend=0.0, cubic=0.0, square=0.0, creep_fast=0.0, creep_slow=0.0)
         response = linear.play(np.full(round(RINGS / period), self.volt), period).displacement
         return float(period * np.sum(1.0 - response / response[-1]))
 

@@ -238,11 +238,10 @@ def next_phase(diagnosis: Diagnosis) -> Figure:
     drives = possible_drives(first.training_data)
     records = {str(k): drive.as_record() for k, drive in enumerate(drives)}
     apart = distances(first.fit.model, second.fit.model, first.training_data, records)
-    z = {k: z_of(expected_log_odds(d, first.score.excess, 1)) for k, d in apart.items()}
     best: dict[str, tuple[float, float]] = {}
-    for k, drive in enumerate(drives):
-        name = drive.name.replace("_", " ")
-        best[name] = max(best.get(name, (0.0, 0.0)), (z[str(k)], drive.duration))
+    for drive, distance in zip(drives, apart.values(), strict=True):
+        name, z = drive.name.replace("_", " "), z_of(expected_log_odds(distance, first.score.excess, 1))
+        best[name] = max(best.get(name, (0.0, 0.0)), (z, drive.duration))
     names = sorted(best, key=lambda name: -best[name][0])
     figure, ((axes,),) = canvas(1, 1, 3.6)
     axes.barh(np.arange(len(names)), [best[n][0] for n in names], color=BLUE)

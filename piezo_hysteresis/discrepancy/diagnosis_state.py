@@ -75,7 +75,7 @@ class DiagnosisState:
 
     @property
     def usable(self) -> list[int]:
-        """Indices of the records that may be compared with a model, and have as many samples as a record counts."""
+        """Indices of the records that may be compared with a model, and have at least `PIECES` samples."""
         informative = [i for i, r in enumerate(self.experiment) if r.phase not in IDLE]
         whole = [i for i in informative if not self.experiment[i].truncated]
         return [i for i in whole if self.experiment[i].size >= PIECES] or whole or informative

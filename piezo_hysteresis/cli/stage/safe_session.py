@@ -41,39 +41,44 @@ def safe_session(settings: DriverSettings, values: Mapping[str, Any], place: str
     settings, values, place
         As for `DriverSession`.
     """
-    before = {number: signal.getsignal(number) for number in _SIGNALS}
-
-    def ignore() -> None:
-        for number in before:
-            signal.signal(number, signal.SIG_IGN)
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        ignore()
-        raise KeyboardInterrupt
-
-    for number, handler in before.items():
-        if handler is not signal.SIG_IGN:
-            signal.signal(number, interrupt)
-    try:
+    with _handlers_kept() as before:
+        for number, handler in before.items():
+            if handler is not signal.SIG_IGN:
+                signal.signal(number, _interrupt)
         session = DriverSession(settings, values, place)
         try:
             yield session
         finally:
             try:
-                ignore()
+                _ignore()
             finally:  # also where a signal has arrived just then
                 session.close()
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
     """Ignore `_SIGNALS` in the block: while a recording is written, another one must not lose it."""
-    before = {number: signal.signal(number, signal.SIG_IGN) for number in _SIGNALS}
-    try:
+    with _handlers_kept():
+        _ignore()
         yield
+
+
+@contextmanager
+def _handlers_kept() -> Iterator[dict[signal.Signals, Any]]:
+    """The handlers of `_SIGNALS`, which are set again after the block."""
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    try:
+        yield before
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _ignore() -> None:
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    _ignore()
+    raise KeyboardInterrupt

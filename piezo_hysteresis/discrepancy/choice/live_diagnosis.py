@@ -176,14 +176,10 @@ class LiveDiagnosis:
         }
 
     @property
-    def _whole(self) -> float:
-        """Stage time of all tiers [s]."""
-        return sum(tier.duration for tier in self.plan)
-
-    @property
-    def _detour(self) -> float:
-        """Stage time of the chosen drives so far [s]."""
-        return self.time - sum(tier.duration for tier in self.plan[: self.tier])
+    def _detour_left(self) -> float:
+        """Stage time that further chosen drives may take before the last tier [s]."""
+        spent = self.time - sum(tier.duration for tier in self.plan[: self.tier])
+        return DETOUR * sum(tier.duration for tier in self.plan) - spent
 
     def _left(self) -> tuple[Tier, ...]:
         """Tiers that were not played yet and fit into the remaining time."""
@@ -219,7 +215,7 @@ class LiveDiagnosis:
             chosen = best_drive(rivals, drives, missing_log_odds(likely, self.error_rate), self.longest - self.time)
             if chosen is not None:
                 phases, separation = chosen
-                if separation.decides and (not left or self._detour + separation.duration <= DETOUR * self._whole):
+                if separation.decides and (not left or separation.duration <= self._detour_left):
                     name = f"{separation.drive}, to separate {' from '.join(separation.rivals)}"
                     return replace(self, due=phases, due_name=name, separation=separation, chosen=self.chosen + 1)
         if left:

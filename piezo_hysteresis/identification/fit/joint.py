@@ -138,20 +138,18 @@ def fit_dynamics(
     notices : tuple of Notice
         ``order_reduced``, if the data do not support the requested orders.
     """
-    longest = max(records[i].duration for i in fitted)
+    slowest = SLOWEST_POLE * max(records[i].duration for i in fitted)
     tried: list[tuple[Fit, Dynamics]] = []
     for order in _ladder(orders):
         start, dynamics = _start(model, records, floors, broadband, delay, order)
         joint = fit_joint(start, records, floors, fitted, progress)
         tried.append((joint, dynamics))
-        if joint.converged and _slowest(joint.model) < SLOWEST_POLE * longest:
+        if joint.converged and _slowest(joint.model) < slowest:
             break
     else:
         joint, dynamics = min(tried, key=lambda outcome: outcome[0].cost)
-    settled = [t for t in tried if _slowest(t[0].model) < SLOWEST_POLE * longest]
-    closest = min(settled, key=lambda outcome: outcome[0].cost, default=tried[-1])
-    if closest[0].cost < MUCH_CLOSER * joint.cost:
-        joint, dynamics = closest
+    closer = [t for t in tried if _slowest(t[0].model) < slowest and t[0].cost < MUCH_CLOSER * joint.cost]
+    joint, dynamics = min(closer, key=lambda outcome: outcome[0].cost, default=(joint, dynamics))
     used = dynamics_of(joint.model)
     reached = used.array("a").size, used.array("b").size
     notices = dynamics.notices

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The linear part of a model without broadband records: a delay, a lightly damped mode, a pole, or ARX of order 3."""
+"""The linear part of a model without broadband records: a delay, a lightly damped mode, a pole, more orders."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     plain = min(found, key=lambda f: f.cost)
     best = _with_mode(plain, pieces, floors)
     held = held_by(best)
-    ringing = best
+    lead = float(np.log(plain.cost / best.cost)) if set(SHAPE) & set(best.names) else 0.0
     poles = []
     for pole in (0.3, 0.8):
         arx = Arx(a=(-pole,), b=(1.0 - pole,), delay=best.model[Arx.name]["delay"])
@@ -98,8 +98,7 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
             poles.append(tried)
     lagging = min(poles, key=lambda f: f.cost, default=best)
     best = _with_two_more_orders(plain, lagging if lagging.cost < POLE_GAINS * best.cost else best, pieces, floors)
-    rings = set(SHAPE) <= set(best.names)
-    return best, float(np.log(plain.cost / ringing.cost)) if rings else 0.0
+    return best, lead if ExtraResonance.name in best.model else 0.0
 
 
 def _with_two_more_orders(

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ...effects import ExtraResonance
 from ...model.model import Model
+from ...record import Record
 from .pieces import Kind, RecordPiece
 
 Array = NDArray[np.float64]
@@ -53,20 +54,14 @@ def ringing_frequency(model: Model, pieces: Sequence[RecordPiece]) -> float | No
     pieces : sequence of RecordPiece
         Pieces in order.
     """
-    steps = [p.kind is Kind.STEP and p.record.size >= 4 * CYCLES for p in pieces]
-    if not any(steps):
-        return None
     best: tuple[float, float] | None = None
-    for y, piece, wanted in zip(model.free_run([p.record for p in pieces]), pieces, steps, strict=True):
-        if not wanted:
-            continue
-        e = piece.record.displacement - y
+    for record, e in _after_steps(model, pieces, 4 * CYCLES):
         t = np.linspace(-1.0, 1.0, e.size)
         e = e - np.polynomial.Polynomial.fit(t, e, 2)(t)
         size = 8 * e.size
-        frequency = np.fft.rfftfreq(size, piece.record.sample_period)
+        frequency = np.fft.rfftfreq(size, record.sample_period)
         power = np.abs(np.fft.rfft(e, size)) ** 2
-        low, high = max(CYCLES / piece.record.duration, SLOWEST), RESOLVED / piece.record.sample_period
+        low, high = max(CYCLES / record.duration, SLOWEST), RESOLVED / record.sample_period
         band = (frequency > low) & (frequency < high)
         if not band.any():
             continue
@@ -90,14 +85,21 @@ def decay_after_steps(model: Model, pieces: Sequence[RecordPiece]) -> Array | No
     pieces : sequence of RecordPiece
         Pieces in order.
     """
-    echoes = []
-    for y, piece in zip(model.free_run([p.record for p in pieces]), pieces, strict=True):
-        if piece.kind is Kind.STEP and piece.record.size >= FEWEST:
-            e = (piece.record.displacement - y)[:ECHO]
-            echoes.append(e - e[e.size // 2 :].mean())
+    echoes = [e[:ECHO] for _, e in _after_steps(model, pieces, FEWEST)]
     if not echoes:
         return None
+    echoes = [e - e[e.size // 2 :].mean() for e in echoes]
     before = np.concatenate([np.column_stack((e[1:-1], e[:-2])) for e in echoes])
     after = np.concatenate([e[2:] for e in echoes])
     decay = np.append(1.0, -np.linalg.lstsq(before, after, rcond=None)[0])
     return decay if np.abs(np.roots(decay)).max(initial=0.0) < LONGEST else None
+
+
+def _after_steps(model: Model, pieces: Sequence[RecordPiece], fewest: float) -> list[tuple[Record, Array]]:
+    """Records and residuals of the pieces after steps that have at least `fewest` samples."""
+    steps = [p.kind is Kind.STEP and p.record.size >= fewest for p in pieces]
+    if not any(steps):
+        return []
+    records = [p.record for p in pieces]
+    runs = zip(records, model.free_run(records), steps, strict=True)
+    return [(record, record.displacement - y) for record, y, is_step in runs if is_step]

@@ -36,8 +36,10 @@ LONGEST_PERIOD = 60.0
 LABELS = ("phase", "record", "continues", "truncated", "initial_voltage", "sample_period", "start_time")
 """Properties that are constant within a record."""
 
-LEFT_OUT = IDLE, HOLD = ("idle", "hold")
-"""Names of the time before the first and after every phase of a bag; left out unless `ReadOptions.include` has them."""
+IDLE, HOLD = "idle", "hold"
+"""Names of the time before the first and after every phase of a bag."""
+LEFT_OUT = (IDLE, HOLD)
+"""Phases that are left out unless `ReadOptions.include` names them."""
 
 Column = str | int
 """Title or name of a column, or its number from 1."""
