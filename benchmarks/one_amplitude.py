@@ -48,7 +48,7 @@ LEVELS = tuple(np.linspace(0.1, 1.0, 10).tolist())
 """Amplitudes that are predicted, as shares of the fitted one."""
 RATES = (0.1, 5.0)
 """Rates that are predicted [Hz]."""
-SIZES = ("SMOOTH", "BEND", "CURVE", "CREEP_SPREAD", "ONE_RATE", "WANDER")
+SIZES = ("SMOOTH", "LEVEL", "CURVE", "CREEP_SPREAD", "ONE_RATE", "WANDER")
 """Constants of `identification.structure.prior` that are halved and doubled."""
 GRID = 160
 """Relays per axis of the Preisach plane."""

@@ -69,16 +69,18 @@ class PlayTerms:
 
     Parameters
     ----------
-    weights, bends, radii : (s,) ndarray
-        c_j, b_j, and half widths in units of v.
+    weights, radii : (s,) ndarray
+        c_j, and half widths in units of v.
     virgin : float
         State at rest: 0 for centred plays, 1 for the state after a ramp from 0 V.
+    root : (3, s) ndarray or None
+        a_j, b_j and q of the weights that depend on the level (`level_density`); None if they do not.
     """
 
     weights: Array
-    bends: Array
     radii: Array
     virgin: float = 0.0
+    root: Array | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -14,9 +14,9 @@
 
 """Kernels that compute the normalised drive v at which the hysteresis output w has a wanted value.
 
-w(v) = p1 v³ + p2 v + p_e v² + p_4 v⁴ + h(v) + Σ_j c_j (p_j + b_j p_j²) with the plays p_j(v); c and b are the rows of
-one array. h is computed by the kernels of the model, so the root agrees with the model up to rounding. If ∂h/∂v is
-known in closed form, Newton's method is used. Otherwise, or if Newton's method leaves the range or does not converge,
+w(v) = p1 v³ + p2 v + p_e v² + p_4 v⁴ + h(v) + Σ_j c_j f_j(p_j) with the plays p_j(v) and f_j of `level_density`; c, a,
+b and q are the rows of one array. h is computed by the kernels of the model, so the root agrees with it up to rounding.
+If ∂h/∂v is known in closed form, Newton's method is used. Otherwise, or if Newton's method leaves the range or does not converge,
 one Newton step is followed by the secant method inside a bracket.
 """
 
@@ -26,6 +26,7 @@ from math import copysign
 
 from ..blocks.bouc_wen_kernel import BETA, GAMMA, A, general_step, plain_step
 from ..blocks.kernel import fma, inlined
+from ..effects.hysteresis.level_density import level_density, level_value
 from ..effects.hysteresis.published_bouc_wen import step as published_step
 from ..inverse_terms import GENERAL, NO_LOOP, PLAIN, PUBLISHED
 
@@ -60,11 +61,11 @@ def static_part(poly, v):
 
 @inlined
 def plays_end(c, radii, plays, v):
-    """Σ c_j (p_j + b_j p_j²) at v."""
+    """Σ c_j f_j(p_j) at v."""
     total = 0.0
     for j in range(radii.size):
         p = max(v - radii[j], min(v + radii[j], plays[j]))
-        total += c[0, j] * (p + c[1, j] * p * p)
+        total += c[0, j] * level_value(p, c[1, j], c[2, j], c[3, j])
     return total
 
 
@@ -86,7 +87,7 @@ def slope_at(kind, p, poly, c, radii, h, v, plays, s):
         slope += p[A] - (p[BETA] * s + p[GAMMA] * copysign(1.0, h)) * h
     for j in range(radii.size):
         if s * (v - plays[j]) >= radii[j] * (1.0 - 1e-9):
-            slope += c[0, j] * (1.0 + 2.0 * c[1, j] * (v - s * radii[j]))
+            slope += c[0, j] * level_density(v - s * radii[j], c[1, j], c[2, j], c[3, j])
     return slope
 
 
@@ -159,7 +160,7 @@ enum {{ MOST = {MOST} }};
     """\
 /* A hysteresis before a sample: loop, polynomial p1, p2, p_e, p_4, plays. */
 typedef struct {
-    const double *p, *poly, *c, *bend, *radius, *play;
+    const double *p, *poly, *c, *a, *b, *q, *radius, *play;
     int plays;
     double h, v;
 } hysteresis_before;
@@ -178,7 +179,7 @@ static double without_loop(const hysteresis_before *b, double v)
     int j;
     for (j = 0; j < b->plays; j++) {
         const double p = larger(v - b->radius[j], smaller(v + b->radius[j], b->play[j]));
-        total += b->c[j] * (p + b->bend[j] * p * p);
+        total += b->c[j] * level_value(p, b->a[j], b->b[j], b->q[j]);
     }
     return FMA(FMA(poly[0], square, poly[1]), v, FMA(poly[3], square, poly[2]) * square) + total;
 }
@@ -192,7 +193,7 @@ static double slope_at(const hysteresis_before *b, double h, double v, double s)
     slope += b->p[0] - (b->p[1] * s + b->p[2] * copysign(1.0, h)) * h;
     for (j = 0; j < b->plays; j++) {
         if (s * (v - b->play[j]) >= b->radius[j] * (1.0 - 1e-9)) {
-            slope += b->c[j] * (1.0 + 2.0 * b->bend[j] * (v - s * b->radius[j]));
+            slope += b->c[j] * level_density(v - s * b->radius[j], b->a[j], b->b[j], b->q[j]);
         }
     }
     return slope;

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from ..blocks.block import Block, State
 from ..c_form import CForm, Number
 from ..effects.drive.amplifier_saturation import RAMP
+from ..effects.hysteresis.level_density import DENSITY_IN_C, VALUE_IN_C
 from ..errors import ModelError
 from ..inverse_terms import NO_LOOP, POLYNOMIAL, InverseTerms, LoopTerms, PlayTerms, RelaxationTerms
 from . import hysteresis_solver as solver
@@ -76,8 +77,10 @@ class NonlinearPart:
         self._loop = hysteresis.loop or WITHOUT_LOOP
         self.kind, self.loop = self._loop.kind, tuple(self._loop.numbers.tolist())
         self.periods = self._loop.periods or (sample_period, sample_period)
-        self._plays = hysteresis.plays or PlayTerms(np.zeros(0), np.zeros(0), np.zeros(0))
-        self.weights, self.radii = np.vstack((self._plays.weights, self._plays.bends)), self._plays.radii
+        self._plays = hysteresis.plays or PlayTerms(np.zeros(0), np.zeros(0))
+        c, self.radii = self._plays.weights, self._plays.radii
+        root = np.outer((1.0, 0.0, 0.0), np.ones(c.size)) if self._plays.root is None else self._plays.root
+        self.weights = np.vstack((c, root))
         self._bracket(drive)
         self.drive = tuple(drive.tolist())
         self._relaxations = [t.relaxations for t in terms if t.relaxations is not None]
@@ -86,8 +89,9 @@ class NonlinearPart:
     def _bracket(self, d: Array) -> None:
         """Set in `d` the interval of the search for roots: between extrema of the static curve, inside the limits."""
         p1, p2, square, fourth = self.poly
-        c, bends = self.weights
-        slope = np.array([p2 + c.sum(), 2.0 * (square + c @ bends), 3.0 * p1, 4.0 * fourth])
+        c, a, b, q = self.weights
+        plays = [c @ (a * a), 2.0 * c @ (a * b), c @ (b * b + 2.0 * a * q), 2.0 * c @ (b * q), c @ (q * q)]
+        slope = np.array([p2, 2.0 * square, 3.0 * p1, 4.0 * fourth, 0.0]) + plays
         if slope[0] == 0.0:
             raise ModelError("hysteresis: the static curve has no slope at 0 V; expected p2 or plays")
         d[r.TURN] = np.sign(slope[0])
@@ -135,7 +139,7 @@ class NonlinearPart:
             "virgin": self._plays.virgin,
             "PLAYS": self.radii.size,
         }
-        plays = (("c", self.weights[0]), ("bend", self.weights[1]), ("radius", self.radii))
+        plays = (*zip(("c", "a", "b_", "q"), self.weights, strict=True), ("radius", self.radii))
         numbers |= {name: np.pad(values, one_at_least) for name, values in plays}
         numbers |= {"loop": np.array(self.loop + self.periods), "poly": np.array(self.poly)}
         numbers |= dict(zip(r.DRIVE, self.drive, strict=True))
@@ -156,7 +160,8 @@ class NonlinearPart:
             before.insert(0, r.BEFORE_IN_C.replace("BANK", str(b)))
             rest.append(r.SETTLED_IN_C.replace("BANK", str(b)))
             after.append(r.AFTER_IN_C.replace("BANK", str(b)))
-        library = (*self._loop.library, RAMP, solver.LOOP_END_IN_C[self.kind], solver.SOLVE_IN_C, r.AMPLIFIER_IN_C)
+        loop = (*self._loop.library, RAMP, solver.LOOP_END_IN_C[self.kind])
+        library = (*loop, VALUE_IN_C, DENSITY_IN_C, solver.SOLVE_IN_C, r.AMPLIFIER_IN_C)
         step = "".join((*before, r.DRIVE_IN_C, *after, "return u;"))
         return CForm(step, "".join((*rest, "return w;")), numbers, tuple(state), library)
 

@@ -23,7 +23,7 @@ from __future__ import annotations
 from math import sqrt
 
 from ..blocks.kernel import inlined, kernel
-from .hysteresis_solver import loop_end, solve, static_part
+from .hysteresis_solver import loop_end, plays_end, solve, static_part
 
 PER_VOLT, LEFT, LEAD, BACK, PLAY, REACH, LOWER, UPPER, CORNER, LOWEST, HIGHEST, STEP, LOW, HIGH, TURN, RESOLUTION = (
     range(16)
@@ -147,11 +147,9 @@ def invert(targets, kind, p, periods, poly, c, radii, d, bank, state, plays, las
         h, last = loop_end(kind, p, periods, h, last, v), v
         now = static_part(poly, v) + h
         if radii.size:
-            total = 0.0
+            now += plays_end(c, radii, plays, v)
             for j in range(radii.size):
                 plays[j] = max(v - radii[j], min(v + radii[j], plays[j]))
-                total += c[0, j] * (plays[j] + c[1, j] * plays[j] * plays[j])
-            now += total
         relax_to(now, starts, direct, lead, weights, lasts, banks, ahead)
     state[H], state[LAST], state[W] = h, last, now
 
@@ -190,13 +188,13 @@ for (j = 0; j < PLAYS; j++) {
     s->play[j] = s->v - virgin * smaller(larger(s->v, -radius[j]), radius[j]);
 }
 {
-    const hysteresis_before b = { loop, poly, c, bend, radius, s->play, PLAYS, s->h, s->v };
+    const hysteresis_before b = { loop, poly, c, a, b_, q, radius, s->play, PLAYS, s->h, s->v };
     w = s->w = without_loop(&b, s->v) + s->h;
 }
 """
 """C code of the state at rest, without the banks."""
 DRIVE_IN_C = """\
-const hysteresis_before b = { loop, poly, c, bend, radius, s->play, PLAYS, s->h, s->v };
+const hysteresis_before b = { loop, poly, c, a, b_, q, radius, s->play, PLAYS, s->h, s->v };
 double v = solve(&b, x, s->w, turn, low, high) / per_volt, u, w, before;
 int j;
 /* the drive voltage, inside the limits, for a voltage v after the play */

@@ -134,7 +134,7 @@ class OwnPlaysBlock(Block):
         raise NotImplementedError
 
     def inverse_terms(self):
-        return InverseTerms(plays=PlayTerms(self.c, np.zeros(self.c.size), self.radii))
+        return InverseTerms(plays=PlayTerms(self.c, self.radii))
 
     def inverse_start(self, x, state):
         return InverseStart(plays=state)

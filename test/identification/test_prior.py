@@ -98,7 +98,7 @@ def test_smooth_weights_and_one_rate_have_no_cost_and_others_have():
     assert cost(model) < 0.01
     spike = model.with_values({"hysteresis_memory.c[0]": 0.08})
     two = model.with_values({"creep_two_rates.gamma_fast": CREEP - 0.01, "creep_two_rates.gamma_slow": CREEP + 0.01})
-    bent = model.with_values({"level_dependent_memory.k_narrow": 0.5})
+    bent = model.with_values({"level_dependent_memory.slope_narrow": 2.0, "level_dependent_memory.curvature": -2.0})
     curved = model.with_values({"bouc_wen.p1": 0.5, "even_input_polynomial.p_e": -0.5})
     assert min(cost(spike), cost(two), cost(bent), cost(curved)) > 0.3
 

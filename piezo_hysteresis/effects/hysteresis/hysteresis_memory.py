@@ -114,10 +114,8 @@ class HysteresisMemory(Effect):
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         names = tuple(f"hysteresis_memory.c[{j}]" for j in range(self.array("c").size))
         if terms:
-            by_bend = np.vstack((np.linspace(1.0, 0.0, self.radii.size), np.linspace(0.0, 1.0, self.radii.size)))
-            bends = np.array([terms[0]["k_narrow"], terms[0]["k_wide"]])
-            names += tuple(f"{terms[0].name}.{n}" for n in ("k_narrow", "k_wide"))
-            return LevelDependentMemoryBlock(names, self.array("c"), self.radii, self["virgin"], bends, by_bend)
+            names += tuple(f"{terms[0].name}.{p.name}" for p in terms[0].parameters if not p.fixed)
+            return LevelDependentMemoryBlock(names, self.array("c"), self.radii, self["virgin"], terms[0])
         return HysteresisMemoryBlock(names, self.array("c"), self.radii, self["virgin"])
 
 
@@ -185,4 +183,4 @@ class HysteresisMemoryBlock(PlaysBlock):
         return plays_in_c("p", self.c, self.radii, self.virgin)
 
     def inverse_terms(self) -> InverseTerms:
-        return InverseTerms(plays=PlayTerms(self.c, np.zeros(self.c.size), self.radii, self.virgin))
+        return InverseTerms(plays=PlayTerms(self.c, self.radii, self.virgin))

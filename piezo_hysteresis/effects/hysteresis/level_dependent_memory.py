@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 
 from ...blocks.block import Array, Block, State
@@ -23,23 +25,32 @@ from ...blocks.kernel import kernel
 from ...c_form import CForm, Number
 from ...inverse_terms import InverseStart, InverseTerms, PlayTerms
 from ...parameter import Parameter
-from ..effect import ChainPosition, Term
+from ..effect import ChainPosition, Effect, Term
+from ..extent import Extent
 from ..invertibility import Invertibility
+from .level_density import VALUE_IN_C, level_density, level_slopes, level_value
+
+
+def _relative(name: str, symbol: str, meaning: str, power: int) -> Parameter:
+    return Parameter(name, symbol, "1", 0.0, -2.0, 2.0, meaning, "Preisach", 0.0, 0.1, powers=(power, 0))
 
 
 class LevelDependentMemory(Term):
-    """The weight of each play grows or shrinks with the position of the play.
+    """The weight of each play depends on the position of the play.
 
     Parameters
     ----------
-    k_narrow, k_wide : float
-        Relative growth per unit of level of the narrowest and of the widest play [1]; interpolated linearly in the
-        number of the play.
+    slope_narrow, slope_wide : float
+        k_j of the narrowest and of the widest play [1]; interpolated linearly in the number of the play.
+    curvature : float
+        q of all plays [1].
+    middle : float
+        Position m at which the weights are c_j [normalised, 1].
 
     Notes
     -----
-    A Preisach operator can be written as a sum of plays, with one monotone function f_j for every play. This effect is
-    the quadratic term of f_j. Up to |k| = 0.5 and |p| = 1 every f_j is monotone, so that the operator can be inverted.
+    A Preisach operator can be written as a sum of plays, with one monotone function f_j for every play; its derivative
+    is the Preisach density along the level. Here the density is c_j (1 + k_j (p − m) + q (p − m)²)².
     """
 
     name = "level_dependent_memory"
@@ -47,39 +58,42 @@ class LevelDependentMemory(Term):
     place = ChainPosition.HYSTERESIS
     host = "hysteresis_memory"
     invertibility = Invertibility.EXACT
-    equation = "Σ_j c_j (p_j + k_j p_j²),  k_j from k_narrow to k_wide"
-    signature = "Loops of one amplitude are wider at one end of the range than at the other"
-    source = "quadratic term of a Preisach operator, written with one function for each play"
+    equation = "Σ_j c_j ∫_0^p_j (1 + k_j (s − m) + q (s − m)²)² ds,  k_j from k_1 to k_n"
+    signature = "Loops of one amplitude are wider at one level of the range than at another"
+    source = "Preisach operator, written with one function for each play"
     parameters = (
+        _relative("slope_narrow", "k_1", "slope along the level, narrowest play", -1),
+        _relative("slope_wide", "k_n", "slope along the level, widest play", -1),
+        _relative("curvature", "q", "curvature along the level", -2),
         Parameter(
-            "k_narrow", "k_1", "1", 0.0, -0.5, 0.5, "growth of the narrowest play", "Preisach", 0.0, 0.1, powers=(-1, 0)
-        ),
-        Parameter(
-            "k_wide", "k_n", "1", 0.0, -0.5, 0.5, "growth of the widest play", "Preisach", 0.0, 0.1, powers=(-1, 0)
+            "middle", "m", "1", 0.0, -10.0, 10.0, "level of the weights c_j", "Preisach", fixed=True, powers=(1, 0)
         ),
     )
 
+    @classmethod
+    def starts(cls, extent: Extent) -> tuple[Self, ...]:
+        return (cls(middle=0.5 * (extent.voltage_min + extent.voltage_max) / extent.voltage_scale),)
+
 
 @kernel
-def run_level_plays(v, c, bends, radii, plays, y):
-    """Output y (n,) = Σ c_j (p_j + b_j p_j²); plays (s,) is updated."""
+def run_level_plays(v, c, a, b, q, radii, plays, y):
+    """Output y (n,) = Σ c_j f_j(p_j); plays (s,) is updated."""
     for i in range(v.size):
         total = 0.0
         for j in range(radii.size):
             p = max(v[i] - radii[j], min(v[i] + radii[j], plays[j]))
             plays[j] = p
-            total += c[j] * (p + bends[j] * p * p)
+            total += c[j] * level_value(p, a[j], b[j], q)
         y[i] = total
 
 
 @kernel
-def linearise_level_plays(v, dv, c, bends, by_bend, radii, plays, dplays, y, dy, own):
-    """`run_level_plays` and derivatives: dv (m, n) to dy (m, n); own (s + k, n) by c_j and by the k numbers of b_j."""
+def linearise_level_plays(v, dv, c, a, b, q, m, radii, plays, dplays, y, dy, own):
+    """`run_level_plays` and derivatives: dv (m, n) to dy (m, n); own (s + 3, n) by c_j, k_1, k_n and q."""
     s = radii.size
     for i in range(v.size):
         total = 0.0
-        for k in range(by_bend.shape[0]):
-            own[s + k, i] = 0.0
+        own[s:, i] = 0.0
         for r in range(dv.shape[0]):
             dy[r, i] = 0.0
         for j in range(s):
@@ -92,12 +106,16 @@ def linearise_level_plays(v, dv, c, bends, by_bend, radii, plays, dplays, y, dy,
             elif held >= high:
                 for r in range(dv.shape[0]):
                     dplays[r, j] = dv[r, i] if held > high else min(dplays[r, j], dv[r, i])
-            own[j, i] = p + bends[j] * p * p
+            own[j, i] = level_value(p, a[j], b[j], q)
             total += c[j] * own[j, i]
-            for k in range(by_bend.shape[0]):
-                own[s + k, i] += c[j] * by_bend[k, j] * p * p
+            by_k, by_q = level_slopes(p, a[j], b[j], q, m)
+            wide = j / (s - 1.0)
+            own[s, i] += (1.0 - wide) * c[j] * by_k
+            own[s + 1, i] += wide * c[j] * by_k
+            own[s + 2, i] += c[j] * by_q
+            density = c[j] * level_density(p, a[j], b[j], q)
             for r in range(dv.shape[0]):
-                dy[r, i] += c[j] * (1.0 + 2.0 * bends[j] * p) * dplays[r, j]
+                dy[r, i] += density * dplays[r, j]
         y[i] = total
 
 
@@ -123,11 +141,11 @@ return total;
 """C code of plays for one sample."""
 
 
-def plays_in_c(value: str, c: Array, radii: Array, virgin: float, **numbers: Array) -> CForm:
+def plays_in_c(value: str, c: Array, radii: Array, virgin: float, library: str = "", **numbers: Number) -> CForm:
     """C code of Σ c_j value(p_j), from a C expression in p."""
     constants: dict[str, Number] = {"PLAYS": c.size, "c": c, "radius": radii, "virgin": virgin, **numbers}
     step, rest = (code.replace("VALUE", value) for code in (STEP, REST))
-    return CForm(step, rest, constants, (f"double p[{c.size}]",))
+    return CForm(step, rest, constants, (f"double p[{c.size}]",), (library,) if library else ())
 
 
 class PlaysBlock(Block):
@@ -162,48 +180,49 @@ class PlaysBlock(Block):
 
 
 class LevelDependentMemoryBlock(PlaysBlock):
-    """Σ c_j (p_j + b_j p_j²), b = numbers @ by_bend; state p (s,).
+    """Σ c_j f_j(p_j); state p (s,).
 
     Parameters
     ----------
     names, c, radii, virgin
-        As for `PlaysBlock`; the names of the k numbers follow those of the weights.
-    numbers : (k,) ndarray
-        Numbers of the bends.
-    by_bend : (k, s) ndarray
-        Share of each number in the bend of each play.
+        As for `PlaysBlock`; the names of k_1, k_n and q follow those of the weights.
+    term : LevelDependentMemory
+        The dependence on the level.
     """
 
-    def __init__(
-        self, names: tuple[str, ...], c: Array, radii: Array, virgin: float, numbers: Array, by_bend: Array
-    ) -> None:
+    def __init__(self, names: tuple[str, ...], c: Array, radii: Array, virgin: float, term: Effect) -> None:
         super().__init__(names, c, radii, virgin)
-        self.by_bend, self.bends = by_bend, numbers @ by_bend
+        self.middle, self.q = term["middle"], term["curvature"]
+        k = np.linspace(term["slope_narrow"], term["slope_wide"], c.size)
+        self.a, self.b = 1.0 - self.middle * (k - self.q * self.middle), k - 2.0 * self.q * self.middle
 
     def static(self, x0: float) -> float:
-        p = self.rest(x0, 0.0)
-        return float(self.c @ (p + self.bends * p * p))
+        return float(self.c @ level_value(self.rest(x0, 0.0), self.a, self.b, self.q))
 
     def static_slopes(self, x0: float) -> tuple[float, Array]:
-        p = self.rest(x0, 0.0)
-        slope = float(self.c @ ((1.0 + 2.0 * self.bends * p) * self._rest_slopes(x0)))
-        return slope, np.concatenate((p + self.bends * p * p, self.by_bend @ (self.c * p * p)))
+        p, wide = self.rest(x0, 0.0), np.linspace(0.0, 1.0, self.c.size)
+        by_k, by_q = level_slopes(p, self.a, self.b, self.q, self.middle)
+        own = np.array([(1.0 - wide) * by_k, wide * by_k, by_q]) @ self.c
+        slope = self.c @ (level_density(p, self.a, self.b, self.q) * self._rest_slopes(x0))
+        return float(slope), np.concatenate((level_value(p, self.a, self.b, self.q), own))
 
     def run(self, x: Array, state: State) -> tuple[Array, State]:
         y, state = np.empty_like(x), state.copy()
-        run_level_plays(x, self.c, self.bends, self.radii, state, y)
+        run_level_plays(x, self.c, self.a, self.b, self.q, self.radii, state, y)
         return y, state
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()
         rows = np.empty((len(dx) + len(self.names), x.size))
         mapped, own = rows[: len(dx)], rows[len(dx) :]
-        incoming = np.ascontiguousarray(dx)
-        linearise_level_plays(x, incoming, self.c, self.bends, self.by_bend, self.radii, state, tangent, y, mapped, own)
+        numbers = self.c, self.a, self.b, self.q, self.middle, self.radii
+        linearise_level_plays(x, np.ascontiguousarray(dx), *numbers, state, tangent, y, mapped, own)
         return y, rows, state, tangent
 
     def c_form(self) -> CForm:
-        return plays_in_c("(p + bend[j] * p * p)", self.c, self.radii, self.virgin, bend=self.bends)
+        call, own = "level_value(p, a[j], b[j], q)", (self.c, self.radii, self.virgin)
+        return plays_in_c(call, *own, VALUE_IN_C, a=self.a, b=self.b, q=self.q)
 
     def inverse_terms(self) -> InverseTerms:
-        return InverseTerms(plays=PlayTerms(self.c, self.bends, self.radii, self.virgin))
+        root = np.vstack((self.a, self.b, np.full(self.a.size, self.q)))
+        return InverseTerms(plays=PlayTerms(self.c, self.radii, self.virgin, root))

@@ -44,8 +44,8 @@ ONE_RATE = 0.005
 """Standard deviation of the difference between fast and slow creep [1/decade]."""
 SMOOTH = 0.1
 """Standard deviation of the second difference of the weights of neighbouring plays, as a share of `LOOP`."""
-BEND = 0.2
-"""Standard deviation of the growth of the weights with the level [1]."""
+LEVEL = 0.5
+"""Standard deviation of k_1, k_n and q of weights that depend on the level [1]."""
 CURVE = 0.1
 """Standard deviation of the coefficients of the cube, the square and the fourth power of the drive [1].
 
@@ -113,8 +113,8 @@ def prior_of(model: Model, names: Sequence[str], slow: int) -> Array:
         for around in zip(padded, weights, padded[2:], strict=False):
             terms = [(n, f) for n, f in zip(around, (1.0, -2.0, 1.0), strict=True) if n is not None]
             rows.append(_row(model, names, terms, SMOOTH * LOOP, slow))
-    bends = [n for n in names if n.partition(".")[0] == MEMORY.level_term.name]
-    rows += [_row(model, names, [(n, 1.0)], BEND, slow) for n in bends]
+    levels = [n for n in names if n.partition(".")[0] == MEMORY.level_term.name]
+    rows += [_row(model, names, [(n, 1.0)], LEVEL, slow) for n in levels]
     curves = {f"{EvenInputPolynomial.name}.{p.name}" for p in EvenInputPolynomial.parameters}
     curves.add(f"{model.hysteresis.name}.p1")
     rows += [_row(model, names, [(n, 1.0)], CURVE, slow) for n in names if n in curves]

@@ -60,7 +60,7 @@ class ModelStructure:
     @property
     def size(self) -> int:
         """Number of optional parameters; one rate of creep does not count, because every piezo ceramic creeps."""
-        return int(self.square) + abs(self.creep_rates - 1) + 2 * int(self.level)
+        return int(self.square) + abs(self.creep_rates - 1) + 3 * int(self.level)
 
     @property
     def effects(self) -> tuple[str, ...]:

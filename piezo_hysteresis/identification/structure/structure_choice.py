@@ -113,15 +113,14 @@ def choose_structure(
     used, sizes = [records[i] for i in kept], [floors[i] for i in kept]
     pieces = pieces_of(used, [k for k, i in enumerate(kept) if i in fitted])
     progress("structure: lag", 0.1)
-    plain, ringing = fit_linear_part(_with_plays(start, used), pieces, sizes)
+    full, ringing = fit_linear_part(_with_plays(start, used), pieces, sizes)
     progress("structure: effects", 0.4)
-    held = held_by(plain)
+    held = held_by(full)
     for _ in range(DISCOUNTS):
-        pieces = discounted_steps(pieces, plain)
+        pieces = discounted_steps(pieces, full)
         if all(p.share == 1.0 for p in pieces):
             break
-        plain = fit_structure(plain.model, pieces, sizes, held)
-    full = fit_structure(plain.model.with_effect(MEMORY.level_term()), pieces, sizes, held)
+        full = fit_structure(full.model, pieces, sizes, held)
     judged = sorted(judge(full, pieces, _offered(pieces)), key=lambda j: j.score)
     best = judged[0]
     chosen = min((j for j in judged if not j.score > best.score + TIE), key=lambda j: (j.structure.size, j.score))
@@ -170,16 +169,18 @@ def _offered(pieces: Sequence[RecordPiece]) -> list[ModelStructure]:
 
 
 def _with_plays(start: Model, records: Sequence[Record]) -> Model:
-    """The model with all effects that are offered, except weights that depend on the level, at start values."""
+    """The model with all effects that are offered, at start values."""
     period = start.sample_period
     farthest = max(float(np.abs(np.append(r.voltage, r.settled_voltage)).max()) for r in records)
     low = min(float(np.append(r.voltage, r.settled_voltage).min()) for r in records)
     high = max(float(np.append(r.voltage, r.settled_voltage).max()) for r in records)
     reach = WIDEST * max(farthest, 0.5 * (high - low)) / start.voltage_scale
-    (creep,) = CreepTwoRates.starts(Extent.of(records, start.voltage_scale, start.displacement_scale))
+    extent = Extent.of(records, start.voltage_scale, start.displacement_scale)
+    (creep,), (level,) = CreepTwoRates.starts(extent), MEMORY.level_term.starts(extent)
     effects: tuple[Effect, ...] = (
         start.hysteresis.memoryless() or start.hysteresis,
         MEMORY(c=(0.02,) * PLAYS, reach=reach, virgin=1.0),
+        level,
         EvenInputPolynomial(),
         creep.with_values(gamma_fast=START_CREEP, gamma_slow=START_CREEP),
         Arx(a=(), b=(1.0,), delay=1.0),
