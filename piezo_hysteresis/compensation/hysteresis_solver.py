@@ -16,8 +16,8 @@
 
 w(v) = p1 v³ + p2 v + p_e v² + p_4 v⁴ + h(v) + Σ_j c_j f_j(p_j) with the plays p_j(v) and f_j of `level_density`; c, a,
 b and q are the rows of one array. h is computed by the kernels of the model, so the root agrees with it up to rounding.
-If ∂h/∂v is known in closed form, Newton's method is used. Otherwise, or if Newton's method leaves the range or does not converge,
-one Newton step is followed by the secant method inside a bracket.
+If ∂h/∂v is known in closed form, Newton's method is used. Otherwise, or if Newton's method leaves the range or does not
+converge, one Newton step is followed by the secant method inside a bracket.
 """
 
 from __future__ import annotations
