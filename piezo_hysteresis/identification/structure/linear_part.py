@@ -27,6 +27,7 @@ from ..records.excitation_content import excitation_content
 from .piece_fit import DELAY, GAIN, POLE, PieceFit, fit_pieces
 from .pieces import Kind, RecordPiece
 from .ringing import RESOLVED, SLOWEST, decay_after_steps, ringing_frequency
+from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
 
 LAGS = (0.3, 1.5, 4.0)
 """Start values of the delay [samples]."""
@@ -46,6 +47,8 @@ SILENT_DAMPING = 0.2
 """Damping ratio assumed for a mode that does not ring; its lag is part of the delay."""
 WHOLE = 0.3
 """Largest deviation from 1 of the share of a mode of the whole stage; with another share it may be an alias."""
+CONTRADICTED = 0.5
+"""Largest ratio of the mean square misfits of all other motion without and with the steps if these contradict it."""
 SHAPE, SHARE = tuple(f"{ExtraResonance.name}.{n}" for n in ("f0", "zeta")), f"{ExtraResonance.name}.r"
 """Parameters of a mode."""
 
@@ -66,7 +69,9 @@ def fit_structure(
     return fit_pieces(model, pieces, floors, [n for n in free_numbers(model) if n not in held])
 
 
-def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> tuple[PieceFit, float]:
+def fit_linear_part(
+    model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]
+) -> tuple[PieceFit, float, float]:
     """Fit a delay; a mode, if the stage rings or its gain rises with frequency; a pole; two more orders, if they help.
 
     Parameters
@@ -84,6 +89,8 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
         Fit of all free parameters.
     lead : float
         ln of the factor by which a ringing mode lowers the cost; 0 without such a mode.
+    late : float
+        How much later the steps come than all other motion says, if they contradict it [samples]; otherwise 0.
     """
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in LAGS]
     plain = min(found, key=lambda f: f.cost)
@@ -97,8 +104,13 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
         if tried.model.values()[POLE] < 0.0:
             poles.append(tried)
     lagging = min(poles, key=lambda f: f.cost, default=best)
-    best = _with_two_more_orders(plain, lagging if lagging.cost < POLE_GAINS * best.cost else best, pieces, floors)
-    return best, lead if ExtraResonance.name in best.model else 0.0
+    best = lagging if lagging.cost < POLE_GAINS * best.cost else best
+    apart = without_steps(pieces)
+    other = fit_structure(best.model, apart, floors, (*held_by(best), *SHAPE)) if apart else best
+    if misfit_beside_steps(other, pieces) < CONTRADICTED * misfit_beside_steps(best, pieces):
+        return other, lead, lateness_of_steps(other, pieces)
+    best = _with_two_more_orders(plain, best, pieces, floors)
+    return best, lead if ExtraResonance.name in best.model else 0.0, 0.0
 
 
 def _with_two_more_orders(
@@ -131,7 +143,7 @@ def held_by(fit: PieceFit) -> tuple[str, ...]:
 
 
 def mode_notices(fit: PieceFit) -> list[Notice]:
-    """``ringing`` with the fitted numbers of the mode, if there is one; one that rings has all numbers free."""
+    """``ringing`` with the numbers of the mode, if there is one; one that does not ring has the assumed damping."""
     order = fit.model[Arx.name].array("a").size
     if order > 1:
         said = f"after a step the stage rings faster than half of the sampling rate; ARX of order {order} describes it"
@@ -140,7 +152,7 @@ def mode_notices(fit: PieceFit) -> list[Notice]:
         return []
     mode = fit.model[ExtraResonance.name]
     shown = f"a mode at {mode['f0']:.4g} Hz with"
-    if set(SHAPE) <= set(fit.names):
+    if mode["zeta"] != SILENT_DAMPING:
         said = f"the stage rings after the step: {shown} a damping ratio of {mode['zeta']:.2g}"
     else:
         said = (

@@ -23,9 +23,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from .piece_fit import PieceFit
+import numpy as np
+
+from .piece_fit import DELAY, PieceFit
 from .pieces import Kind, RecordPiece
 
+UNHEARD = 1e-3
+"""Share of the usual weight of steps with which they only determine what no other motion shows."""
 ALIKE = 10.0
 """Ratio of the mean square misfit of a step to that of all other pieces from which the step has less weight."""
 
@@ -44,13 +48,30 @@ def discounted_steps(pieces: Sequence[RecordPiece], fit: PieceFit) -> list[Recor
         A fit to them.
     """
     counted = [k for k, p in enumerate(pieces) if p.kind is not Kind.CONDITIONING]
-    rest = [j for j, k in enumerate(counted) if pieces[k].kind is not Kind.STEP]
-    if not rest:
-        return list(pieces)
-    weights, squares = fit.weights, fit.squares
-    usual = ALIKE * max(1.0, float(weights[rest] @ squares[rest] / weights[rest].sum()))
-    found = list(pieces)
-    for k, square in zip(counted, squares.tolist(), strict=True):
+    found, usual = list(pieces), ALIKE * max(1.0, misfit_beside_steps(fit, pieces))
+    for k, square in zip(counted, fit.squares.tolist(), strict=True):
         if pieces[k].kind is Kind.STEP:
             found[k] = replace(pieces[k], share=min(1.0, usual / square) if square > 0.0 else 1.0)
     return found
+
+
+def without_steps(pieces: Sequence[RecordPiece]) -> list[RecordPiece]:
+    """The pieces, where steps have hardly any weight; none if there is no step, or no second rate to show the lag."""
+    if len({p.rate for p in pieces if p.kind is Kind.LOOP}) < 2 or all(p.kind is not Kind.STEP for p in pieces):
+        return []
+    return [replace(p, share=UNHEARD) if p.kind is Kind.STEP else p for p in pieces]
+
+
+def misfit_beside_steps(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
+    """Mean square misfit of the pieces that are no steps, in floors; infinite if all are steps."""
+    steps = [p.kind is Kind.STEP for p in pieces if p.kind is not Kind.CONDITIONING]
+    weights = np.where(steps, 0.0, fit.weights)
+    return float(weights @ fit.squares / weights.sum()) if weights.any() else np.inf
+
+
+def lateness_of_steps(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
+    """How much later than in the model the responses to the steps begin, by their slope with the delay [samples]."""
+    counted = [p for p in pieces if p.kind is not Kind.CONDITIONING]
+    steps = sum(m for m, p in zip(fit.matrices, counted, strict=True) if p.kind is Kind.STEP)
+    delay = fit.names.index(DELAY)
+    return float(steps[delay, -1] / steps[delay, delay])

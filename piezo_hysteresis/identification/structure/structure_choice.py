@@ -57,6 +57,8 @@ START_CREEP = 0.005
 """Creep per decade of time at which a fit starts."""
 DISCOUNTS = 2
 """Number of times that the weights of steps are adapted to their misfit; the first fit takes part of it up."""
+LATE = 0.1
+"""Difference between the lags of steps and of other motion that is told [samples]."""
 TIE = 0.02
 """Difference of scores (mean ln R²) within which the structure with fewer parameters is chosen."""
 CREEPS = (Creep.name, CreepTwoRates.name)
@@ -82,7 +84,7 @@ class StructureChoice:
         For every optional effect, the score (mean ln R²) of the best structure without it minus the score of the chosen
         one, if there are structures without it; empty if the state of the operator was kept.
     notices : tuple of Notice
-        ``structure``, ``memory``, ``ringing``.
+        ``structure``, ``memory``, ``ringing``, ``step_time``.
     """
 
     fit: Fit
@@ -113,7 +115,7 @@ def choose_structure(
     used, sizes = [records[i] for i in kept], [floors[i] for i in kept]
     pieces = pieces_of(used, [k for k, i in enumerate(kept) if i in fitted])
     progress("structure: lag", 0.1)
-    full, ringing = fit_linear_part(_with_plays(start, used), pieces, sizes)
+    full, ringing, late = fit_linear_part(_with_plays(start, used), pieces, sizes)
     progress("structure: effects", 0.4)
     held = held_by(full)
     for _ in range(DISCOUNTS):
@@ -130,6 +132,10 @@ def choose_structure(
     described = "; ".join(f"{_words(j.structure)} {np.exp(0.5 * j.score):.3g}" for j in judged[:3])
     rival, lead = _rival(start, final, chosen, pieces, sizes)
     notices = mode_notices(rival or final)
+    if abs(late) > LATE:
+        later = "later" if late > 0.0 else "earlier"
+        said = f"the steps come {later} than all other motion, as if the drive did not jump at a sample"
+        notices.append(Notice("step_time", f"{said}; the lag is that of the other motion"))
     notices.append(
         Notice(
             "structure",
