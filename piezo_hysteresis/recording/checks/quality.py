@@ -116,7 +116,7 @@ def _gain(experiment: Experiment, gain: float) -> list[Notice]:
 
 def _likely(value: float, usual: float) -> str:
     """The power of a thousand that brings a value nearest to the usual one."""
-    power = 3 * round(float(np.log10(usual / value)) / 3)
+    power = 3 * round(float(np.log10(usual) - np.log10(value)) / 3)
     return f"; a unit may be off by 1e{power:+d}" if power else ""
 
 
