@@ -31,6 +31,7 @@ SHORTEST_SHARE = 1 / 64
 """A piece between two gaps is kept if it is at least this share of the phase."""
 
 _NEEDED = ("voltage", "displacement")
+"""Channels without whose numbers a sample is lost."""
 _ROW = "row"
 """Name of the row number beside the channels; it shows which samples were recorded."""
 
