@@ -97,10 +97,14 @@ class TimeColumn:
             raise RecordError("time: got the time of one sample, expected two or more; give `sample_period`")
         steps = np.diff(time)
         forward = steps[steps > 0]
-        if not forward.size or not np.isfinite(time).all():
+        if not np.isfinite(time).all():
+            at = int(np.argmin(np.isfinite(time)))
             raise RecordError(
-                "time: got times that do not grow or are not finite, expected seconds or dates; give `sample_period`"
+                f"time: got no number in row {at + 1} of {time.size} rows with data, expected seconds or dates; leave "
+                "the row out by `rows`, or give `sample_period`"
             )
+        if not forward.size:
+            raise RecordError("time: got times that never grow, expected seconds or dates; give `sample_period`")
         # times written with few digits stand still between their steps: then the mean step is used
         is_coarse = int(np.count_nonzero(steps == 0)) > COARSE * steps.size
         usual = 0.0 if is_coarse else float(np.median(steps[steps >= 0]))

@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 from scipy import io
 
-from piezo_hysteresis.errors import PiezoError, RecordingError
+from piezo_hysteresis.errors import PiezoError, RecordError, RecordingError
 from piezo_hysteresis.recording import read
 
 TIME = np.arange(200) * 5e-3
@@ -176,6 +176,30 @@ def test_late_time_stamps_are_no_gaps(tmp_path):
     assert messages["gap"] == "2 samples are missing in 2 places"
     assert messages["interpolated"].startswith("2 lost samples")
     assert "time_base" in messages
+
+
+def test_a_rejected_cell_is_shown(tmp_path):
+    lines = text(",", "time_s,voltage_V,displacement_um\n").splitlines()
+    lines[60:70] = [",".join((*line.split(",")[:2], '"1,234.5"')) for line in lines[60:70]]
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    experiment = read(tmp_path / "t.csv", phases="x")
+    (message,) = [n.message for n in experiment.notices if n.kind == "not_a_number"]
+    assert message == "10 cells are empty or hold no number, e.g. '1,234.5'"
+
+
+def test_a_row_without_a_time_is_named(tmp_path):
+    table = text(",", "time_s,voltage_V,displacement_um\n")
+    (tmp_path / "t.csv").write_text(table + "End of file\nmax,9.5,43\n")
+    with pytest.raises(RecordError, match="time: got no number in row 201 of 202"):
+        read(tmp_path / "t.csv")
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be"])
+def test_utf_16_is_named(tmp_path, encoding):
+    mark = "\ufeff" if encoding == "utf-16-be" else ""
+    (tmp_path / "t.csv").write_text(mark + text(",", "time_s,voltage_V,displacement_um\n"), encoding=encoding)
+    with pytest.raises(RecordingError, match="got text in UTF-16"):
+        read(tmp_path / "t.csv")
 
 
 def test_a_row_that_is_written_twice_is_used_once(tmp_path):
