@@ -220,7 +220,7 @@ def identify(
         notices.append(
             Notice(
                 "nothing_held_out",
-                "all records were fitted, so the errors are not prediction errors; leave out a phase with --held-out",
+                "no phase was left out, so the errors are not prediction errors; leave one out with --held-out",
             )
         )
     found = Identification(

@@ -21,10 +21,11 @@
 
 ====================  ==========================================================================================
 ``gap`` ``split``     samples are missing; the phase is split, and the part after the gap is `truncated`
+``interpolated``      lost samples in short gaps of smooth channels, which were interpolated
 ``pause``             nothing was measured while a device held its voltage and was read out
 ``non_finite``        samples that are not finite or beyond any stage; they are treated as a gap
 ``not_a_number``      cells of a table without a number
-``duplicate``         samples that were received twice; the first ones are used
+``duplicate``         samples that were received or written twice; the first ones are used
 ``non_monotonic``     samples that were received out of order, or a time that decreases
 ``restart``           the driver was restarted within a bag
 ``cut`` ``damaged``   the file ends early, or parts of it cannot be decoded

@@ -22,6 +22,7 @@ from pathlib import Path
 from ...discrepancy import Diagnosis, diagnose
 from ...discrepancy.choice.live_diagnosis import LiveDiagnosis
 from ...errors import IdentificationError, ParameterError
+from ...identification.records.conditioning_split import NOT_USED
 from ...model import model_file
 from ...report.figures.comparison import compare_diagnosis
 from ...report.json_file import write_json
@@ -72,7 +73,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Diagnose, print and save; returns 0 for all three verdicts.
+    """Diagnose, print and save; returns 0 for all three verdicts, or 1 if most of the data could not be used.
 
     Raises
     ------
@@ -109,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
     for written in (path, corrected, args.json, args.report):
         if written:
             out.print(f"wrote {written}")
-    return 0
+    return int(any(n.kind == NOT_USED and n.severe for n in found.experiment.notices))
 
 
 def _save_corrected(found: Diagnosis, path: str | None) -> str:

@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
         left = f" {floor_sentence(comparison, now)}{left}"
     verdict = f"{error_sentence(now.percent)}{left}{_caveats(experiment)}"
     console().print(f"Verdict: {verdict}", style="bold")
-    severe = any(notice.severe for notice in experiment.notices)
+    severe = any(notice.severe for notice in (*experiment.notices, *conditioned))
     return 0 if describes(now.percent) and not severe else 1
 
 

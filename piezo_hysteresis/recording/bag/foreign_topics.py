@@ -180,7 +180,6 @@ def _records(
         )
     if not stamped:
         notices.append(Notice("time_base", "the messages have no time stamps; their times of reception are used"))
-    breaks = {int(at): int(lost) for at, lost in zip(base.breaks, base.lost, strict=True)}
-    parts, more_notices = split_at_gaps(channels, options.sample_period or base.period, breaks, truncated=truncated)
+    parts, more_notices = split_at_gaps(channels, options.sample_period or base.period, *base.gaps, truncated=truncated)
     records, proposed = labelled(parts, options.phases)
     return records, [*notices, *more_notices, *proposed]

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,6 +51,11 @@ _ALONE = 0.5
 """Largest movement of the displacement just before and after a drop-out, as a share of its jump."""
 _BESIDE = 3
 """Number of samples before and after a drop-out in which the displacement moves little."""
+_BEND = 2.5
+"""Second differences of the displacement after a pulse of the voltage, over those before, up to which it stands still.
+"""
+_VISIBLE = 0.05
+"""The same as a share of the movement that the pulse would cause at low frequency, so that noise does not hide it."""
 _ROUGH_SHARE, _FEW = 0.001, 3
 """Share and number of samples up to which drop-outs do not spoil a phase."""
 
@@ -143,28 +150,52 @@ def _taken_off(voltage: Samples, start: int, stop: int) -> float:
 
 
 def _dropouts(record: Record) -> list[Notice]:
-    """Displacement that jumps away and back within a few samples while the drive is smooth."""
+    """A channel that jumps away and back within a few samples while the other one does not move so."""
     y, u = record.displacement, record.voltage
-    longest = max(1, min(1000, record.size // 100))
-    steps = np.diff(y)
-    large = np.flatnonzero(np.abs(steps) > max(0.1 * float(np.ptp(y)), 8.0 * float(np.quantile(np.abs(steps), 0.99))))
-    count = samples = 0
+    notices = []
+    for name, values, is_smooth in (
+        ("displacement", y, lambda a, b: bool(np.ptp(u[max(0, a - 20) : b + 20]) < 0.25 * np.ptp(u))),
+        ("voltage", u, lambda a, b: _does_not_follow(record, a, b)),
+    ):
+        lengths = _jumps_and_back(values, is_smooth)
+        if lengths:
+            ending = "" if values is y else ", and the displacement does not follow"
+            text = f"the {name} drops out {len(lengths)} times, {sum(lengths)} samples in all{ending}"
+            severe = sum(lengths) > max(_FEW, _ROUGH_SHARE * record.size)
+            notices.append(Notice("dropout", text, record.phase, severe=severe))
+    return notices
+
+
+def _jumps_and_back(values: Samples, is_smooth: Callable[[int, int], bool]) -> list[int]:
+    """Lengths of the jumps away and back; the other channel `is_smooth` around them."""
+    longest = max(1, min(1000, values.size // 100))
+    steps = np.diff(values)
+    least = max(0.1 * float(np.ptp(values)), 8.0 * float(np.quantile(np.abs(steps), 0.99)))
+    large = np.flatnonzero(np.abs(steps) > least)
+    lengths = []
     k = 0
     while k + 1 < large.size:
         a, b = int(large[k]), int(large[k + 1])
-        back = abs(y[b + 1] - y[a]) < 0.25 * abs(steps[a])
-        around = u[max(0, a - 20) : b + 20]
+        back = abs(values[b + 1] - values[a]) < 0.25 * abs(steps[a])
         # a stage that rings after a step moves as fast before and after
         beside = np.concatenate((steps[max(0, a - _BESIDE) : a], steps[b + 1 : b + 1 + _BESIDE]))
         alone = float(np.abs(beside).max(initial=0.0)) < _ALONE * abs(steps[a])
-        if back and alone and steps[a] * steps[b] < 0 and b - a <= longest and np.ptp(around) < 0.25 * np.ptp(u):
-            count, samples, k = count + 1, samples + b - a, k + 2
+        if back and alone and steps[a] * steps[b] < 0 and b - a <= longest and is_smooth(a, b):
+            lengths.append(b - a)
+            k += 2
         else:
             k += 1
-    if not count:
-        return []
-    text = f"the displacement drops out {count} times, {samples} samples in all"
-    return [Notice("dropout", text, record.phase, severe=samples > max(_FEW, _ROUGH_SHARE * record.size))]
+    return lengths
+
+
+def _does_not_follow(record: Record, start: int, stop: int) -> bool:
+    """Whether the displacement would show a pulse of the voltage, however weakly, and does not."""
+    y, u = record.displacement, record.voltage
+    expected = float(np.ptp(y)) / float(np.ptp(u)) * abs(float(u[start + 1] - u[start]))
+    bends = np.abs(np.diff(y, 2))
+    before = bends[max(0, start - _DEAD_TIME) : max(0, start - 1)].max(initial=0.0)
+    after = bends[max(0, start - 1) : stop + _DEAD_TIME].max(initial=0.0)
+    return bool(after < _BEND * max(before, float(np.median(bends))) and after < _VISIBLE * expected)
 
 
 def _ramps(values: Samples) -> bool:

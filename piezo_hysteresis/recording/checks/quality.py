@@ -48,6 +48,8 @@ _FREQUENCY_MISMATCH = 0.1
 """Relative difference of the frequency from the one in the phase name."""
 _MOVING = 0.05
 """Share of the largest range of the drive from which a record counts as driven."""
+_REVERSED = -0.9
+"""Correlation of the channels up to which the displacement falls when the voltage rises."""
 _SINE = re.compile(r"sine_(\d+(?:\.\d+)?(?:e[+-]?\d+)?)hz")
 """Phase name of a sine, with its frequency [Hz]."""
 
@@ -116,7 +118,7 @@ def _gain(experiment: Experiment, gain: float) -> list[Notice]:
 
 def _likely(value: float, usual: float) -> str:
     """The power of a thousand that brings a value nearest to the usual one."""
-    power = 3 * round(float(np.log10(usual / value)) / 3)
+    power = 3 * round(float(np.log10(usual) - np.log10(value)) / 3)
     return f"; a unit may be off by 1e{power:+d}" if power else ""
 
 
@@ -177,6 +179,11 @@ def _fundamental(record: Record) -> tuple[float, float]:
     return float(spectrum[1:].argmax() + 1) * resolution if spectrum.size > 1 else 0.0, resolution
 
 
+def _correlation(voltage: Samples, displacement: Samples) -> float:
+    u, y = voltage - voltage.mean(), displacement - displacement.mean()
+    return float(u @ y) / max(float(np.sqrt((u @ u) * (y @ y))), 1e-300)
+
+
 def _polarity(moving: list[Record]) -> list[Notice]:
     """Notice where the displacement falls when the voltage rises, in the record with the slowest drive."""
     slowest = min(moving, key=lambda r: _fundamental(r)[0], default=None)
@@ -187,7 +194,9 @@ def _polarity(moving: list[Record]) -> list[Notice]:
     u, y = (np.fft.rfft((x[part] - x[part].mean()) * window) for x in (slowest.voltage, slowest.displacement))
     at = int(np.abs(u[1:]).argmax()) + 1
     if at < 4 or np.abs(u[at]) ** 2 < 0.2 * float(np.sum(np.abs(u[1:]) ** 2)):
-        return []  # too short for an estimate of the period
-    if float(np.real(y[at] * np.conj(u[at]))) >= 0.0:
+        # too short for an estimate of the period: the channels must be nearly proportional
+        if _correlation(slowest.voltage[part], slowest.displacement[part]) > _REVERSED:
+            return []
+    elif float(np.real(y[at] * np.conj(u[at]))) >= 0.0:
         return []
     return [Notice("polarity", "the displacement falls when the voltage rises", slowest.phase)]

@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Makes records from channels with gaps. Nothing is interpolated."""
+"""Makes records from channels with gaps. Only short gaps in smooth channels are interpolated, which is reported."""
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping
 from typing import Any
 
@@ -24,10 +25,15 @@ from numpy.typing import NDArray
 
 from ...errors import RecordError
 from ...record import Notice, Record, Samples
+from .short_gaps import Gap, filled, is_held, joined, with_missing_rows
 
 SHORTEST_SHARE = 1 / 64
 """A piece between two gaps is kept if it is at least this share of the phase."""
 
+_NEEDED = ("voltage", "displacement")
+"""Channels without whose numbers a sample is lost."""
+_ROW = "row"
+"""Name of the row number beside the channels; it shows which samples were recorded."""
 
 LARGEST = 1e30
 """Numbers beyond this count as damaged, in any unit [V, m]."""
@@ -53,7 +59,7 @@ def split_at_gaps(
     pauses: Mapping[int, int] | None = None,
     **labels: Any,
 ) -> tuple[list[Record], list[Notice]]:
-    """One phase as records without its non-finite and missing samples.
+    """One phase as records without its non-finite and missing samples, except those that `short_gaps` interpolates.
 
     Parameters
     ----------
@@ -73,9 +79,10 @@ def split_at_gaps(
     -------
     records : list of Record
         A record after a gap `continues` and is `truncated`, because its state is known only approximately. After a
-        pause it is not `truncated`.
+        pause, or a short gap in which the voltage was held, it is not `truncated`. Where time decreases, it does not
+        `continue`.
     notices : list of Notice
-        What was dropped.
+        What was dropped or interpolated.
 
     Raises
     ------
@@ -95,42 +102,76 @@ def split_at_gaps(
             notices.append(Notice("non_finite", f"{name} has non-finite samples; the channel was left out", phase))
     if not PERIODS[0] <= sample_period <= PERIODS[1]:
         raise RecordError(f"`sample_period`: got {sample_period:g} s, expected {PERIODS[0]:g} to {PERIODS[1]:g} s")
-    good = (np.abs(voltage) < LARGEST) & (np.abs(displacement) < LARGEST)
-    gaps = {**(breaks or {}), **(pauses or {})}
+    channels = {name: values for name, values in channels.items() if name in kept or name in _NEEDED}
+    rows, breaks, pauses = with_missing_rows(
+        {**channels, _ROW: np.arange(float(voltage.size))}, breaks or {}, pauses or {}
+    )
+    voltage, displacement = (np.where(np.abs(rows[c]) < LARGEST, rows[c], np.nan) for c in _NEEDED)
+    kept = {name: np.interp(np.arange(voltage.size), *_measured(rows[name])) for name in kept}
+    gaps = {**breaks, **pauses}
     edges = sorted(gaps.keys() - {0})
+    begin = float(labels.pop("start_time", 0.0))
+    missing = np.cumsum([0, *(gaps[e] for e in edges)])
+
+    def time_of(sample: int) -> float:
+        return begin + (sample + int(missing[np.searchsorted(edges, sample, "right")])) * sample_period
+
+    lost = ~(np.isfinite(voltage) & np.isfinite(displacement))
+    short = [gap for gap in joined(segments(lost)) if not _has_edge(gap, edges)]
+    voltage, displacement, closed = filled(voltage, displacement, short)
+    good = np.isfinite(voltage) & np.isfinite(displacement)
     pieces = [(a + i, a + j) for a, b in _between(edges, good.size) for i, j in segments(good[a:b])]
     if not pieces:
         raise RecordError(f"phase '{phase}': got no finite sample among {good.size}")
     shortest = min(SHORTEST_SHARE * good.size, max(b - a for a, b in pieces))
-    known = {a for (_, before), (a, _) in zip(pieces, pieces[1:], strict=False) if before == a and a in (pauses or {})}
-    known -= {b for a, b in pieces if b - a < shortest}
+    known = {
+        a
+        for (begun, end), (a, _) in zip(pieces, pieces[1:], strict=False)
+        if end - begun >= shortest
+        and ((end == a and a in pauses) or is_held(voltage, (end, a), a - end + gaps.get(a, 0)))
+    }
     pieces = [(a, b) for a, b in pieces if b - a >= shortest]
-    dropped = good.size - sum(b - a for a, b in pieces)
-    if bad := int(np.count_nonzero(~good)):
+    recorded = np.isfinite(rows[_ROW])
+    dropped = int(np.count_nonzero(recorded)) - sum(int(np.count_nonzero(recorded[a:b])) for a, b in pieces)
+    if bad := int(np.count_nonzero(recorded & ~good)):
         text = f"{bad} of {good.size} samples are not finite and were dropped"
         notices.append(Notice("non_finite", text, phase, severe=bad > good.size // 2))
+    if closed:
+        samples = sum(int(np.count_nonzero(lost[a:b])) for a, b in closed)
+        at = ", ".join(f"{time_of(a):.6g} s" for a, _ in closed[:3]) + (", …" if len(closed) > 3 else "")
+        text = f"{samples} lost samples were interpolated, because the channels are smooth there (at {at})"
+        notices.append(Notice("interpolated", text, phase))
     if dropped > bad:
         text = f"{dropped - bad} samples between closely spaced gaps were dropped"
         notices.append(Notice("split", text, phase, severe=dropped > good.size // 2))
     if len(pieces) > 1:
         notices.append(Notice("split", f"the phase was split at its gaps into {len(pieces)} records", phase))
-    begin = float(labels.pop("start_time", 0.0))
-    missing = np.cumsum([0, *(gaps[e] for e in edges)])
     records: list[Record] = []
     for a, b in pieces:
         if a > 0:
             labels |= {
-                "continues": bool(records or labels.get("continues")),
+                "continues": bool(records or labels.get("continues")) and breaks.get(a) != 0,
                 "truncated": a not in known,
                 "initial_voltage": None,
             }
-        start = begin + (a + int(missing[np.searchsorted(edges, a, "right")])) * sample_period
         others = {name: values[a:b] for name, values in kept.items()}
         records.append(
-            Record(voltage[a:b], displacement[a:b], sample_period, start_time=start, channels=others, **labels)
+            Record(voltage[a:b], displacement[a:b], sample_period, start_time=time_of(a), channels=others, **labels)
         )
     return records, notices
 
 
 def _between(edges: list[int], size: int) -> list[tuple[int, int]]:
     return list(zip([0, *edges], [*edges, size], strict=True))
+
+
+def _has_edge(gap: Gap, edges: list[int]) -> bool:
+    """Whether a break or a pause lies in or at a gap."""
+    k = bisect_left(edges, gap[0])
+    return k < len(edges) and edges[k] <= gap[1]
+
+
+def _measured(values: Samples) -> tuple[Samples, Samples]:
+    """Places and values of the finite samples."""
+    places = np.flatnonzero(np.isfinite(values))
+    return places.astype(np.float64), values[places]

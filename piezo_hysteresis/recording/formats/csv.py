@@ -23,7 +23,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...channel_mapping import QUANTITIES, quantity_of
-from ...errors import RecordingError
+from ...errors import RecordingError, printable
 from ...record import Experiment, Notice, Record, Samples
 from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import averaged_notice
@@ -42,6 +42,8 @@ _LOOK = 1 << 12
 """Number of first bytes by which a text is distinguished from other files."""
 _EPOCH = 1e8
 """Times beyond this [s] count from an epoch, not from the start of the experiment."""
+_SHOWN = 30
+"""Largest number of characters of a cell in a message."""
 
 
 class Csv:
@@ -105,7 +107,8 @@ def _experiment(path: Path, cells: Cells, found: Places, options: ReadOptions) -
     if options.average is None and cells.average > 1:
         notices.append(averaged_notice(cells.average, records[0].sample_period))
     if cells.bad:
-        notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or hold no number"))
+        example = f", e.g. '{printable(cells.example[:_SHOWN])}'" if cells.example else ""
+        notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or hold no number{example}"))
     return Experiment(tuple(records), str(path), tuple(notices))
 
 

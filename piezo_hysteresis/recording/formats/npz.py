@@ -157,14 +157,14 @@ def _phase(file: Path, options: ReadOptions, average: int, end: float) -> tuple[
         def number(name: str, default: float | None) -> float | None:
             return values.number(place[name]) if place[name] in values else default
 
-        period, breaks, more_notices = _time_base(values, place, options, lambda: channel("time"), average)
+        period, gaps, more_notices = _time_base(values, place, options, lambda: channel("time"), average)
         size = values.size(place["voltage"])
         others = [c for c in units if c not in CHANNELS and (c in options.columns or values.size(place[c]) == size)]
         named = place["phase"] in values or _NUMBERED.match(file.name)
         records, notices = split_at_gaps(
             {name: channel(name) for name in ("voltage", "displacement", *others)},
             period,
-            breaks,
+            *gaps,
             phase=values.text(place["phase"], _NUMBERED.sub("", file.stem)),
             start_time=number("start_time", end),
             continues=bool(number("continues", 0.0)),
@@ -182,21 +182,21 @@ def _phase(file: Path, options: ReadOptions, average: int, end: float) -> tuple[
 
 def _time_base(
     values: NpzMembers, place: dict[str, str], options: ReadOptions, times: Callable[[], Samples], average: int
-) -> tuple[float, dict[int, int], list[Notice]]:
+) -> tuple[float, tuple[dict[int, int], ...], list[Notice]]:
     """Sample period [s] from the file; the missing samples, if the file holds times; notices."""
     if options.sample_period is not None:
         if place["time"] in values and values.size(place["time"]) > average:
             TimeColumn.of(times()).require(options.sample_period * average)
-        return options.sample_period * average, {}, []
+        return options.sample_period * average, (), []
     if place["sample_period"] in values or "sample_period" in options.columns:
         period = options.in_si("sample_period", np.array(values.number(place["sample_period"])))
-        return float(period) * average, {}, []
+        return float(period) * average, (), []
     if place["time"] in values or "time" in options.columns:
         base = TimeColumn.of(times())
-        return base.period, dict(zip(base.breaks.tolist(), base.lost.tolist(), strict=True)), base.notices()
+        return base.period, base.gaps, base.notices()
     if (found := _period(values)) is not None:
-        return found * average, {}, []
-    return values.number(place["sample_period"]), {}, []  # raises the error that lists the keys
+        return found * average, (), []
+    return values.number(place["sample_period"]), (), []  # raises the error that lists the keys
 
 
 def _keys(record: Record) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import csv
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,6 +77,8 @@ class Dialect:
         """
         with path.open("rb") as file:
             block = file.read(SNIFFED_BYTES)
+            if block.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+                raise RecordingError("got text in UTF-16, expected UTF-8 or Latin-1; save it again as UTF-8")
             lines = decoded(block).splitlines()
             if file.read(1) and len(lines) > 1:
                 lines.pop()  # it may be incomplete

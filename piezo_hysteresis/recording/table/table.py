@@ -27,7 +27,7 @@ from ..checks.split_at_gaps import split_at_gaps
 from ..segmentation.phases import labelled
 from .column_inference import inference_notice, inferred_columns, require_different, unit_in
 from .read_options import CHANNELS, LABELS, ReadOptions, is_channel
-from .time_column import TimeColumn
+from .time_column import TimeColumn, without_duplicates
 from .units import plain, units_of
 
 Mark = tuple[int, Mapping[str, str]]
@@ -191,13 +191,15 @@ def _segment(
     period = options.sample_period or (labelled_period and labelled_period * (options.average or 1))
     notices: list[Notice] = []
     breaks: dict[int, int] = {}
+    pauses: dict[int, int] = {}
     if time is not None and (time.size > 1 or period is None):
-        base = TimeColumn.of(time)
+        columns, notices = without_duplicates(columns)
+        base = TimeColumn.of(columns["time"])
         if options.sample_period is not None:
             base.require(options.sample_period)
         period = period or base.period
-        breaks = {int(at): int(lost) for at, lost in zip(base.breaks, base.lost, strict=True)}
-        notices = base.notices(phase)
+        breaks, pauses = base.gaps
+        notices = [*(replace(n, phase=phase) for n in notices), *base.notices(phase)]
     if period is None:
         raise RecordingError("got no times and no sample period, expected either; give `sample_period`")
     end = before[-1].start_time + before[-1].duration if before else 0.0
@@ -209,6 +211,7 @@ def _segment(
         {name: values for name, values in columns.items() if name != "time"},
         period,
         breaks,
+        pauses,
         phase=phase,
         start_time=start,
         continues=bool(before) and (_flag(labels, "continues") if "continues" in labels else goes_on),

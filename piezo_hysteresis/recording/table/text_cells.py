@@ -47,6 +47,8 @@ class Cells:
     """First kept row of every combination of words, and the words; empty without words."""
     bad: int
     """Number of cells that do not hold a number."""
+    example: str
+    """The first of them that is not empty, if there is one."""
     average: int
     """Rows that were averaged into one."""
 
@@ -58,6 +60,7 @@ class _Part:
         self.buffer = DecimatingBuffer.of(width, options)
         self.marks: list[tuple[int, dict[str, str]]] = []
         self.bad = 0
+        self.example = ""
 
     def overlaps(self, rows: int) -> bool:
         """Whether the part holds some of the next rows."""
@@ -73,7 +76,13 @@ class _Part:
         """What was read."""
         buffer = self.buffer
         columns = {name: buffer.column(at) for at, name in enumerate(names)}
-        return Cells(columns, [(buffer.kept_row(row), labels) for row, labels in self.marks], self.bad, buffer.factor)
+        return Cells(
+            columns,
+            [(buffer.kept_row(row), labels) for row, labels in self.marks],
+            self.bad,
+            self.example,
+            buffer.factor,
+        )
 
 
 def read_cells(
@@ -101,9 +110,9 @@ def read_cells(
     read = [_Part(len(numbers), options) for options in parts]
     for lines in _line_blocks(path, dialect.skipped):
         holders = [part for part in read if part.overlaps(len(lines))]
-        values, wrong = np.empty((len(lines), len(numbers))), 0  # of skipped rows, if no part holds them
+        values, wrong, example = np.empty((len(lines), len(numbers))), 0, ""  # of skipped rows, if no part holds them
         if holders:
-            values, wrong = _parsed(lines, dialect, list(numbers.values()))
+            values, wrong, example = _parsed(lines, dialect, list(numbers.values()))
         if holders and words:
             cells = _labels(lines, dialect, list(words.values()))
             changes = np.flatnonzero((cells[1:] != cells[:-1]).any(axis=1)) + 1
@@ -111,7 +120,9 @@ def read_cells(
             for part in holders:
                 part.mark(labelled)
         for part in read:
-            part.bad += wrong if part in holders else 0
+            if part in holders:
+                part.bad += wrong
+                part.example = part.example or example
             part.buffer.add(values)
         if all(part.buffer.is_full for part in read):
             break
@@ -139,21 +150,24 @@ def _line_blocks(path: Path, skipped: int) -> Iterator[list[str]]:
                 yield rows
 
 
-def _parsed(lines: list[str], dialect: Dialect, columns: list[int]) -> tuple[Samples, int]:
+def _parsed(lines: list[str], dialect: Dialect, columns: list[int]) -> tuple[Samples, int, str]:
+    """Numbers, how many cells hold none, and the first of them that is not empty."""
     text = [line.replace(",", ".") for line in lines] if dialect.decimal_comma else lines
     try:
         values = np.loadtxt(text, delimiter=dialect.delimiter, usecols=columns, ndmin=2, comments=None, quotechar='"')
-        return values, 0
+        return values, 0, ""
     except (ValueError, IndexError):  # a cell is empty or wrong: every cell is parsed by itself
         values = np.full((len(lines), len(columns)), np.nan)
-        bad = 0
+        bad, example = 0, ""
         for i, line in enumerate(lines):
             row = cells_of(line, dialect.delimiter)
             for j, at in enumerate(columns):
-                number = number_in(row[at], dialect.decimal_comma) if at < len(row) else None
-                bad += number is None
+                cell = row[at] if at < len(row) else ""
+                number = number_in(cell, dialect.decimal_comma)
+                if number is None:
+                    bad, example = bad + 1, example or cell
                 values[i, j] = np.nan if number is None else number
-        return values, bad
+        return values, bad, example
 
 
 def _labels(lines: list[str], dialect: Dialect, columns: list[int]) -> NDArray[np.str_]:

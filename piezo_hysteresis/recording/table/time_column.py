@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +35,8 @@ WINDOW = 8
 """Number of times before and after such a step that decide."""
 LARGEST_CONTRADICTION = 0.05
 """Share by which a sample period given by hand may differ from the times of the file."""
+COARSE = 0.05
+"""Share of times equal to the one before from which the clock is coarser than the sample period."""
 
 
 def round_period(period: float, tolerance: float = 1e-12) -> float:
@@ -63,12 +66,18 @@ class TimeColumn:
         Samples missing before each break; 0 where time decreases.
     jitter : float
         Deviation of the other steps from the period, rms, in periods.
+    repeated : ndarray of int
+        Samples that have the time of the one before and shift all times after them; nothing is missing there.
+    is_coarse : bool
+        True if the clock is coarser than the sample period, so that many times are equal.
     """
 
     period: float
     breaks: NDArray[np.int64]
     lost: NDArray[np.int64]
     jitter: float
+    repeated: NDArray[np.int64]
+    is_coarse: bool
 
     @classmethod
     def of(cls, time: Samples) -> TimeColumn:
@@ -88,25 +97,39 @@ class TimeColumn:
             raise RecordError("time: got the time of one sample, expected two or more; give `sample_period`")
         steps = np.diff(time)
         forward = steps[steps > 0]
-        if not forward.size or not np.isfinite(time).all():
+        if not np.isfinite(time).all():
+            at = int(np.argmin(np.isfinite(time)))
             raise RecordError(
-                "time: got times that do not grow or are not finite, expected seconds or dates; give `sample_period`"
+                f"time: got no number in row {at + 1} of {time.size} rows with data, expected seconds or dates; leave "
+                "the row out by `rows`, or give `sample_period`"
             )
+        if not forward.size:
+            raise RecordError("time: got times that never grow, expected seconds or dates; give `sample_period`")
         # times written with few digits stand still between their steps: then the mean step is used
-        usual = float(np.median(steps[steps >= 0]))
+        is_coarse = int(np.count_nonzero(steps == 0)) > COARSE * steps.size
+        usual = 0.0 if is_coarse else float(np.median(steps[steps >= 0]))
         longest = 1.5 * usual if usual > 0 else 3.0 * float(np.min(forward))
         broken = (steps < 0) | (steps > longest)
+        repeated = np.zeros(steps.size, np.bool_)
         if usual > 0:
-            broken &= ~_catches_up(time, steps, usual)
-            broken |= steps == 0
-        whole = steps[~broken]
+            in_place = _in_place(time, steps, usual)
+            broken &= ~in_place
+            repeated = (steps == 0) & ~in_place
+        whole = steps[~broken & ~repeated]
         mean = float(whole.mean())
         slack = float(np.abs(whole - mean).max() + 4 * np.spacing(np.abs(time).max())) / whole.size
         period = round_period(mean, slack / mean)
         breaks = np.flatnonzero(broken) + 1
         lost = np.maximum(np.rint(steps[broken] / period).astype(np.int64) - 1, 0)
         jitter = float(np.sqrt(np.mean((whole - mean) ** 2))) / period if usual > 0 else 0.0
-        return cls(period, breaks, np.where(steps[broken] > 0, lost, 0), jitter)
+        lost = np.where(steps[broken] > 0, lost, 0)
+        return cls(period, breaks, lost, jitter, np.flatnonzero(repeated) + 1, is_coarse)
+
+    @property
+    def gaps(self) -> tuple[dict[int, int], dict[int, int]]:
+        """The `breaks` and the `pauses` of `split_at_gaps`."""
+        breaks = {int(at): int(lost) for at, lost in zip(self.breaks, self.lost, strict=True)}
+        return breaks, {int(at): 0 for at in self.repeated}
 
     def require(self, period: float) -> None:
         """Compare the times with a sample period that was given by hand.
@@ -130,6 +153,15 @@ class TimeColumn:
     def notices(self, phase: str = "") -> list[Notice]:
         """Findings about the times."""
         message = []
+        if self.is_coarse:
+            text = (
+                "many times are equal, because they are rounded or the clock is coarse; the mean step of "
+                f"{self.period:.6g} s is used as sample period; otherwise give `sample_period`"
+            )
+            message.append(Notice("time_base", text, phase))
+        if self.repeated.size:
+            text = f"the time of the sample before is repeated at {self.repeated.size} places; the state continues"
+            message.append(Notice("non_monotonic", text, phase, severe=self.repeated.size > 1))
         if self.jitter > JITTER:
             message.append(
                 Notice(
@@ -145,19 +177,46 @@ class TimeColumn:
                 Notice("gap", f"{missing} samples are missing in {int((self.lost > 0).sum())} places", phase)
             )
         if back := int((self.lost == 0).sum()):
-            message.append(
-                Notice("non_monotonic", f"the time does not increase at {back} places", phase, severe=back > 1)
-            )
+            message.append(Notice("non_monotonic", f"the time decreases at {back} places", phase, severe=back > 1))
         return message
 
 
-def _catches_up(time: Samples, steps: Samples, usual: float) -> NDArray[np.bool_]:
-    """Steps after which no sample is missing although they are long: the times of a busy computer scatter."""
+def without_duplicates(columns: Mapping[str, Samples]) -> tuple[dict[str, Samples], list[Notice]]:
+    """Columns without the rows that repeat the row before in every column, its time among them.
+
+    Parameters
+    ----------
+    columns : mapping of str to (n,) ndarray
+        Channels, and `time`.
+
+    Returns
+    -------
+    columns : dict of str to ndarray
+        As they were where the clock is coarse: then equal rows may be two samples of a stage at rest.
+    notices : list of Notice
+        ``duplicate`` if rows were dropped.
+    """
+    still = np.diff(columns["time"]) == 0.0
+    if not still.any() or np.count_nonzero(still) > COARSE * still.size:
+        return dict(columns), []
+    for values in columns.values():
+        still &= (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
+    if not (count := int(np.count_nonzero(still))):
+        return dict(columns), []
+    kept = np.append(True, ~still)
+    first = float(columns["time"][1:][still][0])
+    what = "1 row repeats the row before and was" if count == 1 else f"{count} rows repeat the row before and were"
+    text = f"{what} dropped; the first is at {first:.6g} s"
+    return {name: values[kept] for name, values in columns.items()}, [Notice("duplicate", text)]
+
+
+def _in_place(time: Samples, steps: Samples, usual: float) -> NDArray[np.bool_]:
+    """Long or zero steps after which the times are where they would be: those of a busy computer scatter."""
     found = np.zeros(steps.size, np.bool_)
-    late = np.flatnonzero((steps > 1.5 * usual) & (steps < LONGEST_DELAY * usual))
+    late = np.flatnonzero((steps == 0) | ((steps > 1.5 * usual) & (steps < LONGEST_DELAY * usual)))
     around = np.arange(1, WINDOW + 1)
     for some in np.array_split(late, 1 + late.size // 10_000):
         before, after = (np.clip(some[:, None] + i, 0, time.size - 1) for i in (1 - around, around))
         shift = np.median(time[after] - usual * after, axis=1) - np.median(time[before] - usual * before, axis=1)
-        found[some] = shift < 0.5 * usual
+        found[some] = np.abs(shift) < 0.5 * usual
     return found

@@ -249,6 +249,13 @@ def test_a_stage_that_moves_against_its_drive_is_reported():
     assert kinds(Record(drive, -stage(drive), PERIOD, "sine_5hz")) == {"polarity"}
 
 
+@pytest.mark.parametrize("periods", [1, 3])
+def test_a_stage_that_moves_against_a_few_loops_is_reported(periods):
+    drive = 5.0 - 4.0 * np.cos(np.linspace(0.0, 2.0 * np.pi * periods, 4000))
+    assert "polarity" in kinds(Record(drive, 5e-5 - stage(drive), PERIOD, "sine"))
+    assert "polarity" not in kinds(Record(drive, stage(drive), PERIOD, "sine"))
+
+
 def test_a_wrong_sample_period_shows_in_the_name_of_a_sine():
     drive = sine()
     (notice,) = found("sample_period", Record(drive, stage(drive), 10 * PERIOD, "sine_5hz"))

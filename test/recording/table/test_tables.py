@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 from scipy import io
 
-from piezo_hysteresis.errors import PiezoError, RecordingError
+from piezo_hysteresis.errors import PiezoError, RecordError, RecordingError
 from piezo_hysteresis.recording import read
 
 TIME = np.arange(200) * 5e-3
@@ -143,11 +143,11 @@ def test_missing_and_invalid_columns_are_reported(tmp_path, options, says):
 
 def test_cells_without_a_number_split_the_record_and_are_counted(tmp_path):
     lines = text(",", "time_s,voltage_V,displacement_um\n").splitlines()
-    lines[51] = lines[51].rsplit(",", 1)[0] + ","
-    lines[52] = lines[52].rsplit(",", 1)[0] + ",overflow"
+    lines[51:55] = [line.rsplit(",", 1)[0] + "," for line in lines[51:55]]
+    lines[55] = lines[55].rsplit(",", 1)[0] + ",overflow"
     (tmp_path / "t.csv").write_text("\n".join(lines))
     experiment = read(tmp_path / "t.csv", phases="x")
-    assert [(r.size, r.truncated) for r in experiment] == [(50, False), (148, True)]
+    assert [(r.size, r.truncated) for r in experiment] == [(50, False), (145, True)]
     assert {"non_finite", "not_a_number"} <= kinds(experiment)
 
 
@@ -162,7 +162,7 @@ def test_a_gap_in_time_splits_the_record(tmp_path):
 
 
 def test_late_time_stamps_are_no_gaps(tmp_path):
-    """The times of a busy computer scatter by a tenth of the period, and no sample is missing but two."""
+    """The times of a busy computer scatter by a tenth of the period, and no sample is missing but two, in a sine."""
     time = np.arange(4000) * 1e-3
     stamps = time + 1e-4 * np.random.default_rng(1).normal(size=time.size)
     assert np.diff(stamps).max() > 1.5e-3
@@ -171,10 +171,68 @@ def test_late_time_stamps_are_no_gaps(tmp_path):
     there[[1700, 3000]] = False
     np.savetxt(tmp_path / "t.csv", rows[there], delimiter=",", header="time_s,voltage_V,displacement_um", comments="")
     experiment = read(tmp_path / "t.csv", phases="x")
-    assert [r.size for r in experiment] == [1700, 1299, 999]
+    assert [r.size for r in experiment] == [4000]
     messages = {n.kind: n.message for n in experiment.notices}
     assert messages["gap"] == "2 samples are missing in 2 places"
+    assert messages["interpolated"].startswith("2 lost samples")
     assert "time_base" in messages
+
+
+def test_a_rejected_cell_is_shown(tmp_path):
+    lines = text(",", "time_s,voltage_V,displacement_um\n").splitlines()
+    lines[60:70] = [",".join((*line.split(",")[:2], '"1,234.5"')) for line in lines[60:70]]
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    experiment = read(tmp_path / "t.csv", phases="x")
+    (message,) = [n.message for n in experiment.notices if n.kind == "not_a_number"]
+    assert message == "10 cells are empty or hold no number, e.g. '1,234.5'"
+
+
+def test_a_row_without_a_time_is_named(tmp_path):
+    table = text(",", "time_s,voltage_V,displacement_um\n")
+    (tmp_path / "t.csv").write_text(table + "End of file\nmax,9.5,43\n")
+    with pytest.raises(RecordError, match="time: got no number in row 201 of 202"):
+        read(tmp_path / "t.csv")
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be"])
+def test_utf_16_is_named(tmp_path, encoding):
+    mark = "\ufeff" if encoding == "utf-16-be" else ""
+    (tmp_path / "t.csv").write_text(mark + text(",", "time_s,voltage_V,displacement_um\n"), encoding=encoding)
+    with pytest.raises(RecordingError, match="got text in UTF-16"):
+        read(tmp_path / "t.csv")
+
+
+def test_a_row_that_is_written_twice_is_used_once(tmp_path):
+    lines = text(",", "time_s,voltage_V,displacement_um\n").splitlines()
+    (tmp_path / "t.csv").write_text("\n".join([*lines[:50], lines[49], *lines[50:]]))
+    (record,) = experiment = read(tmp_path / "t.csv", phases="x")
+    assert record.size == 200 and "duplicate" in kinds(experiment)
+
+
+def test_after_a_repeated_time_the_state_continues(tmp_path):
+    """The values differ from those of the row before, so that the row may be a sample."""
+    lines = text(",", "time_s,voltage_V,displacement_um\n").splitlines()
+    twice = lines[49].split(",")[0] + "," + lines[50].split(",", 1)[1]
+    (tmp_path / "t.csv").write_text("\n".join([*lines[:50], twice, *lines[50:]]))
+    first, second = experiment = read(tmp_path / "t.csv", phases="x")
+    assert first.size + second.size == 201
+    assert second.continues and not second.truncated and "non_monotonic" in kinds(experiment)
+
+
+def test_after_a_time_that_decreases_nothing_continues(tmp_path):
+    lines = text(",", "time_s,voltage_V,displacement_um\n").splitlines()
+    (tmp_path / "t.csv").write_text("\n".join([*lines[:100], *lines[50:]]))
+    _, second = read(tmp_path / "t.csv", phases="x")
+    assert second.truncated and not second.continues
+
+
+def test_rounded_times_are_one_record_and_one_finding(tmp_path):
+    time = np.round(np.arange(4000) * 5e-4, 3)
+    rows = np.column_stack((time, np.sin(9.0 * time), np.sin(9.0 * time)))
+    np.savetxt(tmp_path / "t.csv", rows, "%.6f", ",", header="time_s,voltage_V,displacement_um", comments="")
+    (record,) = experiment = read(tmp_path / "t.csv", phases="x")
+    assert record.sample_period == pytest.approx(5e-4, rel=1e-3)
+    assert [n.kind for n in experiment.notices if "sample_period" in n.message] == ["time_base"]
 
 
 def test_phases_of_a_table_in_one_go_continue(tmp_path):
