@@ -101,14 +101,17 @@ def diagnose(
         for run in PASSES:
             found = run(state)
             if isinstance(found, Diagnosis):
-                return _compared(found)
+                return compared_with_given(found)
             state = found
     raise IdentificationError("diagnose: got no answer from the last pass, expected a diagnosis")
 
 
-def _compared(found: Diagnosis) -> Diagnosis:
-    """Without a verdict, what is known of a given model is that nothing has changed since it was identified."""
+def compared_with_given(found: Diagnosis) -> Diagnosis:
+    """Without a verdict, what is known of a given model is that nothing has changed since it was identified.
+
+    If the time limit ended the search, the answer says so instead, because a longer search may find a name.
+    """
     unchanged = any(n.kind == UNCHANGED for n in found.experiment.notices)
-    if unchanged and found.verdict is Verdict.UNKNOWN:
+    if unchanged and found.verdict is Verdict.UNKNOWN and found.conclusion is not Conclusion.TIME_LIMIT:
         return replace(found, conclusion=Conclusion.NOTHING_CHANGED)
     return found

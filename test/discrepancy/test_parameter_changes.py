@@ -25,6 +25,7 @@ from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
 from piezo_hysteresis.discrepancy.changes.parameter_changes import find_change
 from piezo_hysteresis.discrepancy.changes.recalibration import recalibrate
 from piezo_hysteresis.discrepancy.changes.same_stage import sentence_of
+from piezo_hysteresis.discrepancy.diagnose import compared_with_given
 from piezo_hysteresis.discrepancy.residual.noise_floor import floors
 from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.identification.identify import identify
@@ -153,6 +154,8 @@ def test_diagnose_says_that_nothing_has_changed(model, another_day):
     found = diagnose(played(another_day), model)
     assert [n.kind for n in found.experiment.notices].count("unchanged") == 1
     assert found.conclusion is Conclusion.NOTHING_CHANGED
+    ended = replace(found, conclusion=Conclusion.TIME_LIMIT)
+    assert compared_with_given(ended).conclusion is Conclusion.TIME_LIMIT  # a longer search may find a name
     later = diagnose(played(replace(another_day, filter_pole=2e-3)), model)
     assert all(n.kind != "unchanged" for n in later.experiment.notices)
     assert later.conclusion is Conclusion.CHANGED_PARAMETER
