@@ -82,7 +82,7 @@ def diagnose(
     RecordError
         If `experiment` holds no records.
     IdentificationError
-        If the drive does not move in any record.
+        If the drive does not move in any record that is compared with a model, or the displacement is constant.
     ModelError
         If the records are faster than the model.
     """

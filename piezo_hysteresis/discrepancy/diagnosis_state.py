@@ -26,7 +26,8 @@ from ..errors import IdentificationError
 from ..identification.fit.fit import Progress
 from ..identification.fit.form_uncertainty import PIECES
 from ..model.model import Model
-from ..record import CONDITIONING, Experiment, Record
+from ..record import CONDITIONING, Experiment
+from .excitation_check import moves
 from .residual.localise import ResidualShare
 from .search.baseline_setup import BaselineSetup
 from .search.selection_result import Selection
@@ -103,8 +104,3 @@ class DiagnosisState:
         if self.selection is None:
             raise IdentificationError("diagnose: got no search, expected the pass search_effects before this one")
         return self.selection
-
-
-def moves(record: Record) -> bool:
-    """Whether the drive moves in a record."""
-    return bool(np.ptp(np.append(record.voltage, record.settled_voltage)) > 0.0)

@@ -32,7 +32,8 @@ from ..record import Notice
 from .changes.same_stage import same_stage
 from .conclusion import concluded
 from .diagnosis import Conclusion, Diagnosis
-from .diagnosis_state import VOLTAGE_NOISE, DiagnosisState, moves
+from .diagnosis_state import VOLTAGE_NOISE, DiagnosisState
+from .excitation_check import check_motion, moves
 from .residual.explicit_step import KIND, explicit_model, without_steps
 from .residual.localise import ResidualShare, localise
 from .residual.sampling import NOISE_WIDTH, quieted, voltage_noise
@@ -79,13 +80,14 @@ def check_data(state: DiagnosisState) -> DiagnosisState | Diagnosis:
     Raises
     ------
     IdentificationError
-        If the drive does not move in any record.
+        If the drive does not move in any record that is compared with a model, or the displacement is constant.
     """
     experiment, model = state.experiment, state.model
     if not any(moves(record) for record in experiment):
         raise IdentificationError("diagnose: the drive does not move in any record; expected loops, steps or noise")
     severe = [n for n in experiment.notices if n.severe]
     if not severe:
+        check_motion("diagnose", [experiment[i] for i in state.moving])
         return state
     reason = f"No verdict is possible, because of the data: {severe[0].message}."
     return Diagnosis(Conclusion.INSUFFICIENT_DATA, reason, model, model, None, None, (), None, None, experiment)

@@ -103,11 +103,11 @@ def diagnose_few(
     fitted = [i for i in used if i not in aside]
     known = _without(experiment, aside)
     progress("baseline", 0.1)
-    published = model or identify(known, progress=lambda word, part: progress(word, 0.1 + 0.1 * part)).model
-    found = None
-    if model is None:
-        found = identify(known, memory=True, progress=lambda word, part: progress(word, 0.2 + 0.3 * part))
-    start = model or (found.model if found else published)
+    published, found = model, None
+    if published is None:  # which records are not fitted was decided above
+        published = identify(known, held_out=(), progress=lambda word, part: progress(word, 0.1 + 0.1 * part)).model
+        found = identify(known, held_out=(), memory=True, progress=lambda w, part: progress(w, 0.2 + 0.3 * part))
+    start = found.model if found else published
     noise = noise_floors(records)
     least = floors(records, noise)
     short = shortened(records, SEARCHED)
