@@ -95,7 +95,8 @@ def diagnose(
         raise ParameterError(f"diagnose: got {other[0]!r} in effects, expected classes of effects such as Creep")
     end = time.monotonic() + time_limit
     progress = progress or (lambda word, fraction: None)
-    state = DiagnosisState(experiment_of(experiment), model, effects, progress, end, explicit_step)
+    recorded = experiment_of(experiment)
+    state = DiagnosisState(recorded, model, effects, progress, end, explicit_step, given=recorded)
     # diverging trials have a large cost
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"), using_cores(cores):
         for run in PASSES:

@@ -62,6 +62,8 @@ class DiagnosisState:
         Distribution of the residual of the baseline.
     selection : Selection or None
         Result of the search.
+    given : Experiment or None
+        The experiment as it was recorded, before the passes prepared it.
     """
 
     experiment: Experiment
@@ -73,6 +75,7 @@ class DiagnosisState:
     setup: BaselineSetup | None = None
     where: tuple[ResidualShare, ...] = ()
     selection: Selection | None = None
+    given: Experiment | None = None
 
     @property
     def usable(self) -> list[int]:

@@ -29,9 +29,10 @@ import numpy as np
 from ...effects import Effect
 from ...errors import PiezoError
 from ...identification.fit.fit import Fit, Progress
-from ...identification.fit.normal_equations import Nuisance, residuals
+from ...identification.fit.normal_equations import Nuisance
 from ...identification.identification import Identification
 from ...identification.identify import identify
+from ...identification.records.conditioning import with_conditioning
 from ...identification.structure.left_out import has_several_drives, score_left_out
 from ...model.model import Model
 from ...model.provenance import provenance
@@ -40,7 +41,7 @@ from ..diagnosis import Conclusion, Diagnosis
 from ..excitation_check import missing_excitation
 from ..gap import Gap, measure_gap, with_stated_error
 from ..next_experiment import best_next_experiment
-from ..residual.localise import localise
+from ..residual.localise import located
 from ..residual.noise_floor import floors, noise_floors, stroke
 from ..residual.sampling import shortened
 from ..verdict import FEWEST_RECORDS, MORE_MAY_BE_MISSING, conclusion_of, is_explained
@@ -118,8 +119,7 @@ def diagnose_few(
     if before.excess > ADEQUATE:
         start_helpers()  # effects will be searched for
     progress("location of the residual", 0.5)
-    left = residuals(baseline.model, records, Nuisance(offset=True))
-    where = localise([records[i] for i in fitted], [left[i] for i in fitted], [least[i] for i in fitted])
+    where = located(baseline.model, records, fitted, least.tolist(), Nuisance(offset=True))
 
     steps: list[Step] = []
     now, score = (found.fit, score_model(start, training_data)) if found else (baseline, before)
@@ -131,13 +131,13 @@ def diagnose_few(
         more = select(
             now.model, training_data, score, null, fitting, lambda word, part: progress(word, 0.6 + 0.3 * part)
         )
-    final, accepted = _delivered(more, now, model, found, records, least.tolist(), fitted)
+    chosen = sorted(aside or fitted)
+    final, accepted = _delivered(more, now, model, found, records, least.tolist(), fitted, chosen)
     further = more.steps if accepted else tuple(replace(s, accepted=False) for s in more.steps)
     reached = more.score if accepted else score
     selection = Selection(baseline.model, final.model, reached, (*steps, *further), null, more.in_time)
 
     progress("gap", 0.9)
-    chosen = sorted(aside or fitted)
     free = Nuisance(offset=True), replace(final.nuisance, offset=True)
     first = model or baseline.model  # the gap of a given model is measured before any refit
     models = first, final.model
@@ -174,8 +174,12 @@ def _delivered(
     records: Sequence[Record],
     least: Sequence[float],
     fitted: Collection[int],
+    tested: Sequence[int],
 ) -> tuple[_Delivered, bool]:
-    """The model that predicts rates, amplitudes and records left out best; a given model stays if none is better."""
+    """The model that predicts rates, amplitudes and records left out best; a given model stays if none is better.
+
+    A model that diverges on a test record is not taken.
+    """
     free = Nuisance(offset=True)
     if found is not None:
         start = _Delivered(found.model, found.fit, free)
@@ -191,6 +195,7 @@ def _delivered(
         for contender in contenders:
             try:
                 score = score_left_out(contender.model, records, least, fitted)
+                contender.model.free_run([records[i] for i in with_conditioning(records, tested)])
             except PiezoError:
                 continue
             if score < reached - EXTENDS:
