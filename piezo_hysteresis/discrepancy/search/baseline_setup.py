@@ -181,7 +181,7 @@ def prepare_baseline(
     training_data, score = score_baseline(baseline.model, training_data)
     if score.excess > ADEQUATE:
         start_helpers()  # effects will be searched for
-        baseline, score = _best(baseline, score, starts, training_data)
+        baseline, score = best_of_starts(baseline, score, starts, training_data)
     if score.excess > ADEQUATE:
         for modal in modal_models(baseline.model, records, fitted):
             baseline, score = clearly_better(modal, baseline, score, training_data) or (baseline, score)
@@ -190,10 +190,13 @@ def prepare_baseline(
     )
 
 
-def _best(found: Fit, score: Score, starts: Iterator[Model], training_data: TrainingData) -> tuple[Fit, Score]:
-    """The fit and its score, or those from another start if cross-validation and fit are better."""
-    with suppress(*FAILURES):
-        for start in map(exact, starts):
+def best_of_starts(found: Fit, score: Score, starts: Iterator[Model], training_data: TrainingData) -> tuple[Fit, Score]:
+    """The fit and its score, or those from another start if cross-validation and fit are better.
+
+    A start from which the fit fails is left out.
+    """
+    for start in map(exact, starts):
+        with suppress(*FAILURES):
             if score_model(start, training_data).cost < score.cost:
                 other = joint(start, training_data, LAST, PRECISE)
                 if other.cost < found.cost:
