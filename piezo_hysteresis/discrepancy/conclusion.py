@@ -72,8 +72,7 @@ def concluded(
     progress("gap", 0.85)
     named = is_explained(selection)
     whole = setup.whole
-    plain = selection.baseline if selection.accepted else selection.model  # the search may have found better dynamics
-    first = joint(plain, replace(training_data, records=whole), LAST, PRECISE)
+    first = joint(selection.baseline, replace(training_data, records=whole), LAST, PRECISE)
     final, final_training_data = first, training_data
     if named:
         final_training_data = selection.accepted[-1].best.training_data
