@@ -124,7 +124,7 @@ def concluded(
 
 
 def _finished(selection: Selection, training_data: TrainingData, null: float) -> Fit:
-    """The last fit, to all samples; restarted with newly estimated dynamics while this reduces the cost."""
+    """The last fit of the named effects; restarted with newly estimated dynamics while this reduces the cost."""
     final = joint(selection.model, training_data, LAST, PRECISE)
     last = selection.accepted[-1].best
     while final.cost > NOISY * null:

@@ -66,8 +66,8 @@ def diagnose(
         Time after which the search ends with the best answer so far [s]. It does not limit the baseline before the
         search and the last fit after it.
     cores : int, optional
-        Largest number of processor cores that are used; by default all that this process may use, or as many as the
-        environment variable PYTHON_CPU_COUNT states. The answer does not depend on it.
+        Largest number of processor cores that are used, at most 4; by default all that this process may use, or as many
+        as the environment variable PYTHON_CPU_COUNT states. The answer does not depend on it.
 
     Returns
     -------

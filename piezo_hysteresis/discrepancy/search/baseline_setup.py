@@ -48,7 +48,7 @@ from .training_data import TrainingData
 Array = NDArray[np.float64]
 
 SEARCHED, FITTED = 6_000, 50_000
-"""Number of samples of a fast record in the search, and in the last fit."""
+"""Largest number of samples of a record, approximately, in the search and in the last fit."""
 UNSURE = 0.3
 """Share of the inter-sample error that is added to the floor; the correction removes the rest."""
 
@@ -98,7 +98,7 @@ class BaselineSetup:
 
     @property
     def whole(self) -> tuple[Record, ...]:
-        """The training records in full length."""
+        """The training records of the last fit, averaged or cut to about `FITTED` samples where they are longer."""
         return tuple(select_records(shortened(self.records, FITTED), self.least.tolist(), self.fitted)[0])
 
     @property
