@@ -162,8 +162,7 @@ def fit(
     free : sequence of str
         Parameters to fit, e.g. ``"bouc_wen.beta"``, ``"arx.a[0]"``.
     floors : sequence of float, optional
-        Floor of the residual of every record [m]; default 1 for all. A record with an infinite floor only determines
-        the state of the next one.
+        Floor of the residual of every record [m]; default 1 for all, infinite for one that only determines the state.
     nuisance : Nuisance, optional
         Disturbances that are free in every record.
     max_iterations : int
