@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 from ..errors import DivergenceError
@@ -23,7 +24,7 @@ from ..identification.fit.fit import Fit, Progress
 from ..identification.fit.form_uncertainty import with_form_uncertainty
 from ..identification.fit.normal_equations import Nuisance
 from ..record import Experiment
-from .diagnosis import Diagnosis, Verdict
+from .diagnosis import Conclusion, Diagnosis, Verdict
 from .excitation_check import missing_excitation
 from .gap import Gap, measure_gap, with_stated_error
 from .next_experiment import best_next_experiment
@@ -38,6 +39,11 @@ from .verdict import conclusion_of, is_explained
 NOISY, WORTHWHILE = 1.1, 0.95
 """Ratio of the cost to the cost of noise above which the last fit is restarted, and largest ratio of the new cost to
 the old one for which the new fit is kept and tested again."""
+DIVERGES = (
+    "No effect is named: the model without further effects diverges on a test record, which may move further than the "
+    "records that were fitted. The gap is that of the fitted records."
+)
+"""Reason of the answer if there is no error on the test records."""
 
 
 def concluded(
@@ -66,34 +72,42 @@ def concluded(
     progress("gap", 0.85)
     named = is_explained(selection)
     whole = setup.whole
-    plain = selection.baseline if selection.accepted else selection.model  # the search may have found better dynamics
-    first = joint(plain, replace(training_data, records=whole), LAST, PRECISE)
-    final_training_data = selection.accepted[-1].best.training_data if named else training_data
-    final = _finished(selection, replace(final_training_data, records=whole), setup.null) if named else first
-    chosen = setup.test_records or tuple(setup.fitted)
+    first = joint(selection.baseline, replace(training_data, records=whole), LAST, PRECISE)
+    final, final_training_data = first, training_data
+    if named:
+        final_training_data = selection.accepted[-1].best.training_data
+        final = _finished(selection, replace(final_training_data, records=whole), setup.null)
+    unseen = tuple(setup.test_records)
 
     def gap_of(last: Fit, nuisance: Nuisance) -> Gap:
         models, nuisances = (first.model, last.model), (training_data.nuisance, nuisance)
-        unseen = bool(setup.test_records)
-        return measure_gap(models, records, chosen, least.tolist(), setup.span, nuisances, unseen)
+        chosen = unseen or tuple(setup.fitted)
+        return measure_gap(models, records, chosen, least.tolist(), setup.span, nuisances, bool(unseen))
 
-    falls = True
+    falls = diverges = False
     if named:
-        try:
+        with suppress(DivergenceError):  # on a test record, which moves further than those that were fitted
             gap = gap_of(final, final_training_data.nuisance)
             falls = gap.falls
-        except DivergenceError:  # on a test record, which moves further than those that were fitted
-            falls = False
-    if not named or not falls:
-        named, final, final_training_data = False, first, training_data
-        gap = gap_of(first, training_data.nuisance)
+    if not falls:
+        final, final_training_data = first, training_data
+        try:
+            gap = gap_of(first, training_data.nuisance)
+        except DivergenceError:
+            if not unseen:
+                raise
+            diverges, unseen = True, ()
+            gap = gap_of(first, training_data.nuisance)
     final = with_form_uncertainty(
         final, whole, final_training_data.nuisance, final_training_data.floors, setup.whole_noise, setup.span
     )
     progress("next experiment", 0.95)
-    conclusion, reason = conclusion_of(selection, named, falls, gap)
-    is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time
-    found = {s.best.effect.public_name() for s in selection.accepted} if named else set()
+    if diverges:
+        conclusion, reason = Conclusion.INSUFFICIENT_DATA, DIVERGES
+    else:
+        conclusion, reason = conclusion_of(selection, falls, falls or not named, gap)
+    is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
+    found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
     return Diagnosis(
         conclusion=conclusion,
         reason=reason,
@@ -110,7 +124,7 @@ def concluded(
 
 
 def _finished(selection: Selection, training_data: TrainingData, null: float) -> Fit:
-    """The last fit, to all samples; restarted with newly estimated dynamics while this reduces the cost."""
+    """The last fit of the named effects; restarted with newly estimated dynamics while this reduces the cost."""
     final = joint(selection.model, training_data, LAST, PRECISE)
     last = selection.accepted[-1].best
     while final.cost > NOISY * null:

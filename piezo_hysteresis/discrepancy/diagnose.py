@@ -66,8 +66,8 @@ def diagnose(
         Time after which the search ends with the best answer so far [s]. It does not limit the baseline before the
         search and the last fit after it.
     cores : int, optional
-        Largest number of processor cores that are used; by default all that this process may use, or as many as the
-        environment variable PYTHON_CPU_COUNT states. The answer does not depend on it.
+        Largest number of processor cores that are used, at most 4; by default all that this process may use, or as many
+        as the environment variable PYTHON_CPU_COUNT states. The answer does not depend on it.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def diagnose(
     RecordError
         If `experiment` holds no records.
     IdentificationError
-        If the drive does not move in any record.
+        If the drive does not move in any record that is compared with a model, or the displacement is constant.
     ModelError
         If the records are faster than the model.
     """
@@ -95,20 +95,24 @@ def diagnose(
         raise ParameterError(f"diagnose: got {other[0]!r} in effects, expected classes of effects such as Creep")
     end = time.monotonic() + time_limit
     progress = progress or (lambda word, fraction: None)
-    state = DiagnosisState(experiment_of(experiment), model, effects, progress, end, explicit_step)
+    recorded = experiment_of(experiment)
+    state = DiagnosisState(recorded, model, effects, progress, end, explicit_step, given=recorded)
     # diverging trials have a large cost
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"), using_cores(cores):
         for run in PASSES:
             found = run(state)
             if isinstance(found, Diagnosis):
-                return _compared(found)
+                return compared_with_given(found)
             state = found
     raise IdentificationError("diagnose: got no answer from the last pass, expected a diagnosis")
 
 
-def _compared(found: Diagnosis) -> Diagnosis:
-    """Without a verdict, what is known of a given model is that nothing has changed since it was identified."""
+def compared_with_given(found: Diagnosis) -> Diagnosis:
+    """Without a verdict, what is known of a given model is that nothing has changed since it was identified.
+
+    If the time limit ended the search, the answer says so instead, because a longer search may find a name.
+    """
     unchanged = any(n.kind == UNCHANGED for n in found.experiment.notices)
-    if unchanged and found.verdict is Verdict.UNKNOWN:
+    if unchanged and found.verdict is Verdict.UNKNOWN and found.conclusion is not Conclusion.TIME_LIMIT:
         return replace(found, conclusion=Conclusion.NOTHING_CHANGED)
     return found

@@ -26,7 +26,8 @@ from ..errors import IdentificationError
 from ..identification.fit.fit import Progress
 from ..identification.fit.form_uncertainty import PIECES
 from ..model.model import Model
-from ..record import CONDITIONING, Experiment, Record
+from ..record import CONDITIONING, Experiment
+from .excitation_check import moves
 from .residual.localise import ResidualShare
 from .search.baseline_setup import BaselineSetup
 from .search.selection_result import Selection
@@ -61,6 +62,8 @@ class DiagnosisState:
         Distribution of the residual of the baseline.
     selection : Selection or None
         Result of the search.
+    given : Experiment or None
+        The experiment as it was recorded, before the passes prepared it.
     """
 
     experiment: Experiment
@@ -72,6 +75,7 @@ class DiagnosisState:
     setup: BaselineSetup | None = None
     where: tuple[ResidualShare, ...] = ()
     selection: Selection | None = None
+    given: Experiment | None = None
 
     @property
     def usable(self) -> list[int]:
@@ -103,8 +107,3 @@ class DiagnosisState:
         if self.selection is None:
             raise IdentificationError("diagnose: got no search, expected the pass search_effects before this one")
         return self.selection
-
-
-def moves(record: Record) -> bool:
-    """Whether the drive moves in a record."""
-    return bool(np.ptp(np.append(record.voltage, record.settled_voltage)) > 0.0)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Effects that an experiment cannot show, because it does not contain the necessary kind of drive.
+"""What an experiment cannot show, because it does not contain the necessary kind of drive.
 
 Every effect declares the drive that it needs as its `excitation_need`.
 """
@@ -24,6 +24,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from ..effects import CATALOGUE, ExcitationNeed
+from ..errors import IdentificationError
 from ..identification.records.excitation_content import SLOW, excitation_content
 from ..record import Notice, Record
 
@@ -68,6 +69,30 @@ def missing_excitation(records: Sequence[Record], found: Collection[str] = ()) -
         if hidden := " and ".join(name for name in names if name not in found):
             notices.append(Notice("not_tested", f"these data can hardly show {hidden}, because {reason}"))
     return tuple(notices)
+
+
+def moves(record: Record) -> bool:
+    """Whether the drive moves in a record."""
+    return bool(np.ptp(np.append(record.voltage, record.settled_voltage)) > 0.0)
+
+
+def check_motion(name: str, moving: Collection[Record]) -> None:
+    """Check that the stage moves in some of the records in which the drive moves.
+
+    Raises
+    ------
+    IdentificationError
+        If there are none, or if the displacement is constant.
+    """
+    if not moving:
+        raise IdentificationError(
+            f"{name}: the drive does not move in any record that is used; expected loops, steps or noise of 16 samples "
+            "or more, in phases other than idle and hold"
+        )
+    if not any(np.ptp(r.displacement) > 0.0 for r in moving):
+        raise IdentificationError(
+            f"{name}: the displacement never changes; expected that of a stage that is driven; check the column"
+        )
 
 
 def _longest_hold(record: Record, least: float) -> float:

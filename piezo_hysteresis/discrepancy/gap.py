@@ -24,6 +24,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ..identification.fit.normal_equations import Nuisance, residuals
+from ..identification.records.conditioning import with_conditioning
 from ..model.model import Model
 from ..model.provenance import free_run
 from ..record import Record
@@ -128,15 +129,22 @@ def measure_gap(
         Disturbances that are free in every record, for each model.
     unseen : bool
         Whether the chosen records were used neither for fitting nor for choosing.
+
+    Raises
+    ------
+    DivergenceError
+        If a model diverges on one of the chosen records, or on one that it continues.
     """
-    rows: list[list[float]] = []
-    for model, nuisance in zip(models, nuisances, strict=True):
-        left = residuals(model, records, nuisance)
-        rows.append([100.0 * float(np.sqrt(np.mean(left[i] ** 2))) / stroke for i in chosen])
+    kept = with_conditioning(records, chosen)
+
+    def left_by(model: Model, nuisance: Nuisance) -> list[float]:
+        left = dict(zip(kept, residuals(model, [records[i] for i in kept], nuisance), strict=True))
+        return [100.0 * float(np.sqrt(np.mean(left[i] ** 2))) / stroke for i in chosen]
+
+    rows = [left_by(model, nuisance) for model, nuisance in zip(models, nuisances, strict=True)]
     before, after = np.array(rows[0]), np.array(rows[1])
     steady = replace(nuisances[1], hum_frequency=None)
-    predicted = left if steady == nuisances[1] else residuals(models[1], records, steady)
-    live = [100.0 * float(np.sqrt(np.mean(predicted[i] ** 2))) / stroke for i in chosen]
+    live = rows[1] if steady == nuisances[1] else left_by(models[1], steady)
     least = 100.0 * np.array([floors[i] for i in chosen]) / stroke
     squares = after**2
     mean, interval = float(squares.mean()), None

@@ -22,9 +22,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import IdentificationError
+from ..errors import DivergenceError, IdentificationError
 from ..identification.fit.fit import Progress
-from ..identification.fit.normal_equations import residuals
 from ..identification.records.conditioning_split import known_from_within
 from ..identification.records.roles import roles_of
 from ..model.model import Model
@@ -32,9 +31,10 @@ from ..record import Notice
 from .changes.same_stage import same_stage
 from .conclusion import concluded
 from .diagnosis import Conclusion, Diagnosis
-from .diagnosis_state import VOLTAGE_NOISE, DiagnosisState, moves
+from .diagnosis_state import VOLTAGE_NOISE, DiagnosisState
+from .excitation_check import check_motion, moves
 from .residual.explicit_step import KIND, explicit_model, without_steps
-from .residual.localise import ResidualShare, localise
+from .residual.localise import ResidualShare, located
 from .residual.sampling import NOISE_WIDTH, quieted, voltage_noise
 from .search.baseline_setup import BaselineSetup, prepare_baseline
 from .search.cross_validation import ADEQUATE
@@ -79,13 +79,14 @@ def check_data(state: DiagnosisState) -> DiagnosisState | Diagnosis:
     Raises
     ------
     IdentificationError
-        If the drive does not move in any record.
+        If the drive does not move in any record that is compared with a model, or the displacement is constant.
     """
     experiment, model = state.experiment, state.model
     if not any(moves(record) for record in experiment):
         raise IdentificationError("diagnose: the drive does not move in any record; expected loops, steps or noise")
     severe = [n for n in experiment.notices if n.severe]
     if not severe:
+        check_motion("diagnose", [experiment[i] for i in state.moving])
         return state
     reason = f"No verdict is possible, because of the data: {severe[0].message}."
     return Diagnosis(Conclusion.INSUFFICIENT_DATA, reason, model, model, None, None, (), None, None, experiment)
@@ -101,6 +102,7 @@ def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosi
         model,
         state.moving,
         lambda part: state.progress("changes of the given model", 0.1 * part),
+        state.given,
     )
     if isinstance(found, Notice):
         state, found = replace(state, experiment=state.experiment.noting(found)), None
@@ -211,6 +213,8 @@ PASSES: tuple[Pass, ...] = (
 
 def _where(setup: BaselineSetup, progress: Progress) -> tuple[ResidualShare, ...]:
     progress("location of the residual", 0.35)
-    left = residuals(setup.baseline.model, setup.records, setup.training_data.nuisance)
-    used, records, least = setup.usable, setup.records, setup.least
-    return localise([records[i] for i in used], [left[i] for i in used], [least[i] for i in used])
+    model, least, nuisance = setup.baseline.model, setup.least.tolist(), setup.training_data.nuisance
+    try:
+        return located(model, setup.records, setup.usable, least, nuisance)
+    except DivergenceError:  # on a test record, which moves further than those that were fitted
+        return located(model, setup.records, setup.fitted, least, nuisance)

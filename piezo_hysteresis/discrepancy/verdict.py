@@ -36,6 +36,9 @@ NAMED, NAMED_FAR = 0.6, 0.75
 FAR = 10.0
 """V above which the remaining error is large: a similar effect of another family may explain as much of the gap."""
 
+MORE_MAY_BE_MISSING = " The time limit ended the search; more effects may be missing."
+"""Added to the reason if effects are named although the time limit ended the search."""
+
 
 class Verdict(StrEnum):
     """The three possible verdicts."""
@@ -120,7 +123,7 @@ def conclusion_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> t
         said = f"The model does not contain {names}, which {explain} {100 * closed:.0f} % of the gap; {rest}."
         fitted = [s.best.effect.public_name() for s in selection.accepted if not s.best.effect.is_predicted_live()]
         if not selection.in_time:
-            said += " The time limit ended the search; more effects may be missing."
+            said += MORE_MAY_BE_MISSING
         return Conclusion.MISSING_EFFECT, " ".join([said, *(not_predicted_live(name, gap.live) for name in fitted)])
     many = gap.unseen and len(gap.per_phase) >= FEWEST_RECORDS
     is_adequate = many and gap.after <= TEST_ADEQUATE * gap.floor and selection.score.excess <= 2.0 * ADEQUATE

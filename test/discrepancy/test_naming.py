@@ -25,12 +25,16 @@ from benchmarks.coverage import truth_of
 from benchmarks.naming_cases import UNKNOWN, Case
 from benchmarks.naming_experiments import ProtocolVariant
 from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
+from piezo_hysteresis.discrepancy.changes.recalibration import recalibrate
 from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
-from piezo_hysteresis.effects import BY_NAME, CATALOGUE
-from piezo_hysteresis.errors import IdentificationError, ParameterError
+from piezo_hysteresis.effects import BY_NAME, CATALOGUE, Arx, BoucWen, Softening
+from piezo_hysteresis.errors import DivergenceError, IdentificationError, ParameterError
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.identification.protocol.protocol import short
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.provenance import data_hash
 from piezo_hysteresis.record import Experiment, Notice, Record
+from piezo_hysteresis.report.figures.comparison import compare_diagnosis
 from piezo_hysteresis.stage.plant.parameters import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
@@ -187,6 +191,56 @@ def test_a_stage_that_was_not_driven_is_refused():
     still = Record(np.full(100, 3.0), np.arange(100.0), 1e-3, phase="rest")
     with pytest.raises(IdentificationError, match="does not move"):
         diagnose(Experiment((still,) * 5))
+
+
+@pytest.mark.parametrize("given", [None, Model((BoucWen(), Arx(a=(), b=(1.0,))), 1e-3, 4.0, 4e-6)])
+def test_a_drive_that_only_prepares_the_stage_is_refused(given):
+    (loops,) = triangle(1)
+    rest = Record(np.zeros(100), np.zeros(100), 1e-3, phase="rest")
+    short = Record(np.full(10, 3.0), np.zeros(10), 1e-3, phase="step", initial_voltage=0.0)
+    prepared = replace(loops, phase="conditioning")
+    for records in ([replace(loops, phase="hold")], [prepared, rest], [short, rest]):
+        with pytest.raises(IdentificationError, match="does not move"):
+            diagnose(Experiment(tuple(records)), given)
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_a_displacement_that_never_changes_is_refused(count):
+    dead = [replace(r, displacement=np.full(r.size, 1e-6)) for r in triangle(count)]
+    given = Model((BoucWen(), Arx(a=(), b=(1.0,))), 1e-3, 4.0, 4e-6)
+    for tried in (None, given):
+        with pytest.raises(IdentificationError, match="the displacement never changes"):
+            diagnose(Experiment(tuple(dead)), tried)
+    with pytest.raises(IdentificationError, match="the displacement never changes"):
+        recalibrate(given, Experiment(tuple(dead)))
+
+
+def test_loops_that_are_all_named_validation_are_diagnosed():
+    """A rest beside them is nothing that a model can be fitted to."""
+    loops = [replace(r, phase="validation") for r in triangle(4)]
+    rest = Record(np.zeros(100), np.zeros(100), 1e-3, phase="rest")
+    assert diagnose(Experiment((*loops, rest))).verdict is not Verdict.NAMED
+
+
+@pytest.mark.parametrize("identified_from_it", [False, True])
+def test_a_model_that_diverges_on_a_test_record_ends_with_an_answer(identified_from_it):
+    """Without the comparison with the given model, too, which the data that it was identified from do not need."""
+    chain = BoucWen(), Arx(a=(-1.58, 0.79), b=(0.21,), delay=1.0)
+    stage = Model(chain, 2e-4, 10.0, 1e-5)
+    given, rng, time = stage.with_effect(Softening(k3=-0.08)), np.random.default_rng(0), 2e-4 * np.arange(3000)
+    noise = np.clip(3.0 + 0.3 * rng.normal(size=(2, 3000)), 0.0, 10.0)
+    drives = (*noise, 3.0 - 3.0 * np.cos(2 * np.pi * 2.0 * time), 3.0 - 2.0 * np.cos(2 * np.pi * 5.0 * time))
+    small = [Record(u, u, 2e-4, p) for u, p in zip(drives, ("noise", "noise", "sine_2hz", "sine_5hz"), strict=True)]
+    large = Record(5.0 + 4.0 * np.sin(2 * np.pi * 290.0 * time), time, 2e-4, "validation", initial_voltage=5.0)
+    with pytest.raises(DivergenceError):
+        given.free_run([large])
+    moved = [replace(r, displacement=given.free_run([r])[0] + 5e-9 * rng.normal(size=3000)) for r in small]
+    experiment = Experiment((*moved, replace(large, displacement=stage.free_run([large])[0])))
+    origin = {"data_hash": data_hash(experiment)} if identified_from_it else {}
+    found = diagnose(experiment, replace(given, provenance=origin))
+    assert found.conclusion is Conclusion.INSUFFICIENT_DATA and "diverges on a test record" in found.reason
+    assert np.isfinite(found.gap.after) and not found.gap.unseen and found.where
+    assert compare_diagnosis(found).model is None  # the page
 
 
 def test_no_effect_is_named_if_its_twin_was_not_a_candidate():

@@ -102,3 +102,12 @@ def test_a_jump_in_the_first_sample_is_a_recorded_slew_rate():
     extent = replace(Extent.of((held,), 10.0, 1e-5), voltage_min=1.0, voltage_max=4.0)
     drives = possible_drives(TrainingData((held,), np.array([5e-9]), Nuisance(), extent))
     assert max(d.largest_slew for d in drives) <= 3.0 / 1e-3 * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("period", [0.2, 0.3, 0.5, 1.0])
+def test_drives_at_long_sample_periods_are_those_that_the_rate_allows(period):
+    """Noise of a second has too few samples there, as a sine of 1 Hz does."""
+    u = np.concatenate([np.linspace(0.0, 10.0, 100), np.linspace(10.0, 0.0, 100)])
+    slow = Record(u, np.zeros(u.size), period)
+    drives = possible_drives(TrainingData((slow,), np.ones(1), Nuisance(), Extent.of((slow,), 10.0, 1e-5)))
+    assert {"staircase", "rest"} <= {d.name for d in drives}

@@ -21,13 +21,18 @@ import pytest
 
 from benchmarks.changes import played as triangles
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
-from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
+from piezo_hysteresis.discrepancy import Conclusion, Diagnosis, Verdict, diagnose
 from piezo_hysteresis.discrepancy.changes.parameter_changes import find_change
 from piezo_hysteresis.discrepancy.changes.recalibration import recalibrate
 from piezo_hysteresis.discrepancy.changes.same_stage import sentence_of
+from piezo_hysteresis.discrepancy.diagnose import compared_with_given
+from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
+from piezo_hysteresis.discrepancy.passes import compare_with_given_model, quiet_voltage
 from piezo_hysteresis.discrepancy.residual.noise_floor import floors
 from piezo_hysteresis.discrepancy.residual.residual import errors
+from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.model.provenance import data_hash
 from piezo_hysteresis.record import Experiment
 from piezo_hysteresis.report.figures.comparison import compare_diagnosis
 
@@ -153,9 +158,24 @@ def test_diagnose_says_that_nothing_has_changed(model, another_day):
     found = diagnose(played(another_day), model)
     assert [n.kind for n in found.experiment.notices].count("unchanged") == 1
     assert found.conclusion is Conclusion.NOTHING_CHANGED
+    ended = replace(found, conclusion=Conclusion.TIME_LIMIT)
+    assert compared_with_given(ended).conclusion is Conclusion.TIME_LIMIT  # a longer search may find a name
     later = diagnose(played(replace(another_day, filter_pole=2e-3)), model)
     assert all(n.kind != "unchanged" for n in later.experiment.notices)
     assert later.conclusion is Conclusion.CHANGED_PARAMETER
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_the_data_of_a_model_are_recognised_if_the_voltage_was_measured(model, known):
+    """The noise of the voltage is removed first, but the model states the hash of the data as recorded."""
+    rng = np.random.default_rng(3)
+    played_noisy = [replace(r, voltage=r.voltage + 2e-3 * rng.normal(size=r.size)) for r in played(STAGE)]
+    recorded = Experiment(tuple(played_noisy))
+    off = replace(model, displacement_scale=1.1 * model.displacement_scale)
+    given = replace(off, provenance={**off.provenance, **({"data_hash": data_hash(recorded)} if known else {})})
+    state = quiet_voltage(DiagnosisState(recorded, given, CATALOGUE, lambda word, part: None, given=recorded))
+    assert state.experiment is not recorded
+    assert isinstance(compare_with_given_model(state), DiagnosisState if known else Diagnosis)
 
 
 def test_one_new_record_recalibrates_a_model(model):

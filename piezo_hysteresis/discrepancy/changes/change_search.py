@@ -73,7 +73,7 @@ class ChangeSearch:
 
     def __init__(self, model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]) -> None:
         self.predicted, self.loop_share = predictions(model, records)
-        self.used, self.period = list(used), model.sample_period
+        self.used = list(used)
         self.sides = ["gain"] + (["loop"] if "loop" in self.predicted[0].rows else [])
         self.weights, self.labels = self._weights(records, floors)
         self.sizes = [records[i].size for i in self.used]

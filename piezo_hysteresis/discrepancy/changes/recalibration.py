@@ -30,6 +30,7 @@ from ...identification.fit.normal_equations import Nuisance, residuals
 from ...model.model import Model
 from ...model.provenance import provenance
 from ...record import Experiment
+from ..excitation_check import check_motion, moves
 from ..residual.noise_floor import floors, stroke
 from .change_kinds import ParameterChange
 from .change_search import ChangeSearch
@@ -81,15 +82,15 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     Raises
     ------
     IdentificationError
-        If the drive does not move in any record, or the changed parameters are beyond their bounds.
+        If the drive does not move in any record, the displacement is constant, or the changed parameters are beyond
+        their bounds.
     ModelError
         If the records are faster than the model.
     """
     records = experiment.records
-    used = [i for i, r in enumerate(records) if np.ptp(np.append(r.voltage, r.settled_voltage)) > 0.0]
+    used = [i for i, r in enumerate(records) if moves(r)]
     used = [i for i in used if not records[i].truncated] or used
-    if not used:
-        raise IdentificationError("recalibrate: the drive does not move in any record; expected at least one loop")
+    check_motion("recalibrate", [records[i] for i in used])
     search = ChangeSearch(model, records, used, floors(records).tolist())
     best = search.shaped("delay", free=search.sides)
     best = min((best, search.account("none", free=search.sides)), key=lambda account: account.cost)
@@ -104,13 +105,14 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
         ) from None
 
     def error(candidate: Model) -> float:
-        left = residuals(candidate, [records[i] for i in range(len(records))], Nuisance(offset=True))
+        left = residuals(candidate, records, Nuisance(offset=True))
         return float(np.sqrt(np.mean([np.mean(left[i] ** 2) for i in used])))
 
     before, after = error(model), error(fitted)
     new = fitted if after < before else model
-    bare = new.without(Offset.name) if Offset.name in new else new
-    zero = float(np.mean([np.mean(residuals(bare, records)[i]) for i in used]))
+    bare = new.without(Offset.name)
+    left = residuals(bare, records)
+    zero = float(np.mean([np.mean(left[i]) for i in used]))
     old = new[Offset.name] if Offset.name in new else Offset()
     span = stroke(records)
     rms = min(before, after)

@@ -23,13 +23,14 @@ import numpy as np
 
 from ...effects import ExtraResonance, Softening, ThermalDrift
 from ...errors import DivergenceError, ModelError, ParameterError
-from ...identification.fit.normal_equations import Nuisance, residuals
+from ...identification.fit.normal_equations import Nuisance
+from ...identification.records.conditioning_split import known_from_within
 from ...model.model import Model
 from ...model.provenance import data_hash
 from ...record import Experiment, Notice, Record
 from ..diagnosis import Conclusion, Diagnosis
 from ..gap import measure_gap, with_stated_error
-from ..residual.localise import localise
+from ..residual.localise import located
 from ..residual.noise_floor import floors, noise_floors, stroke
 from .change_kinds import LEAVES, ParameterChange
 from .parameter_changes import find_change, is_unchanged
@@ -44,9 +45,15 @@ UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 
 def same_stage(
-    experiment: Experiment, model: Model, used: Sequence[int], progress: Callable[[float], None]
+    experiment: Experiment,
+    model: Model,
+    used: Sequence[int],
+    progress: Callable[[float], None],
+    given: Experiment | None = None,
 ) -> Diagnosis | Notice | None:
     """Name the parameter that has changed since `model` was identified.
+
+    The data that the model was identified from show no change.
 
     Parameters
     ----------
@@ -58,6 +65,8 @@ def same_stage(
         Indices of the records to explain.
     progress : callable
         Called with the fraction done.
+    given : Experiment, optional
+        The experiment as it was recorded, if `experiment` has been prepared.
 
     Returns
     -------
@@ -65,7 +74,9 @@ def same_stage(
         The finding that nothing has changed, if the error is the known one; None if no change explains the records.
     """
     records = experiment.records
-    if model.provenance.get(HASH) == data_hash(experiment) or not used:
+    recorded = experiment if given is None else given
+    hashes = {data_hash(e) for e in (experiment, recorded, known_from_within(recorded)[0])}
+    if model.provenance.get(HASH) in hashes or not used:
         return None
     least = floors(records, noise_floors(records))
     known = float(model.provenance.get(ERROR, "0"))
@@ -83,13 +94,12 @@ def same_stage(
             return None
         changed = changed_model(model, change, records)
         free = Nuisance(offset=True)
-        left = residuals(model, records, free)
+        where = located(model, records, used, least.tolist(), free)
         gap = measure_gap((model, changed), records, list(used), least.tolist(), stroke(records), (free, free), False)
     except (DivergenceError, ModelError, ParameterError):
         return None
     if not gap.after < gap.before:
         return None
-    where = localise([records[i] for i in used], [left[i] for i in used], [least[i] for i in used])
     return Diagnosis(
         conclusion=Conclusion.CHANGED_PARAMETER,
         reason=sentence_of(change),

@@ -38,6 +38,8 @@ from ...effects import (
     SensorBandwidth,
     Softening,
 )
+from ...errors import DivergenceError
+from ...model.chain import RUNAWAY
 from ...model.model import Model
 from ...record import Record
 from .change_kinds import KINDS
@@ -103,6 +105,11 @@ def predictions(model: Model, records: Sequence[Record]) -> tuple[list[Changeabl
     A change of the loop height does not change the gain, because that share of the displacement is subtracted.
     The changes are ``gain``, ``loop`` and ``creep``, relative; ``resonance`` in Hz; ``softening`` per cube of the
     range; ``drift`` in m at the end of the longest record.
+
+    Raises
+    ------
+    DivergenceError
+        If the model diverges.
     """
     bare = model.without(Offset.name) if Offset.name in model else model
     loop, creep = loop_numbers(bare), creep_numbers(bare)
@@ -112,7 +119,10 @@ def predictions(model: Model, records: Sequence[Record]) -> tuple[list[Changeabl
     longest = max(r.duration for r in records)
     parts: dict[int, tuple[list[Array], list[Array]]] = {}
     order: list[str] = []
-    for index, _, y, names, slopes in bare.linearise(records, wanted):
+    for index, part, y, names, slopes in bare.linearise(records, wanted):
+        bound = RUNAWAY * bare.displacement_scale
+        if not (np.abs(y).max() < bound and np.abs(slopes).max(initial=0.0) < RUNAWAY * bound):
+            raise DivergenceError(bare.effects[-1].name, part.start, part.start * records[index].sample_period)
         order = list(names)
         outputs, rows = parts.setdefault(index, ([], []))
         outputs.append(y.copy())

@@ -22,6 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...identification.fit.normal_equations import Nuisance
+from ...identification.fit.normal_equations import residuals as residuals_of
+from ...identification.records.conditioning import with_conditioning
+from ...model.model import Model
 from ...record import Record
 
 Array = NDArray[np.float64]
@@ -44,7 +48,7 @@ class ResidualShare:
         ``phase``, ``frequency``, ``amplitude``, ``direction``, ``turning_point_distance``,
         ``time_since_level_change`` or ``absolute_time``.
     share : float
-        Share of the residual power beyond the floor in the bins of `detail`, 0 to 1.
+        Share of the residual power in the bins of `detail`, 0 to 1.
     detail : str
         The bins with the largest shares, as text.
     bins : tuple of (str, float)
@@ -57,6 +61,34 @@ class ResidualShare:
     bins: tuple[tuple[str, float], ...]
 
 
+def located(
+    model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float], nuisance: Nuisance
+) -> tuple[ResidualShare, ...]:
+    """Shares of the residual of a model; records that are neither used nor continued by one are not simulated.
+
+    Parameters
+    ----------
+    model : Model
+        Model that is simulated in free run.
+    records : sequence of Record
+        The whole experiment.
+    used : sequence of int
+        Indices of the records whose residual is located.
+    floors : sequence of float
+        Floor of every record [m].
+    nuisance : Nuisance
+        Disturbances that are free in every record.
+
+    Raises
+    ------
+    DivergenceError
+        If the model diverges.
+    """
+    kept = with_conditioning(records, used)
+    left = dict(zip(kept, residuals_of(model, [records[i] for i in kept], nuisance), strict=True))
+    return localise([records[i] for i in used], [left[i] for i in used], [floors[i] for i in used])
+
+
 def localise(
     records: Sequence[Record], residuals: Sequence[Array], floors: Sequence[float]
 ) -> tuple[ResidualShare, ...]:
@@ -65,7 +97,7 @@ def localise(
     Parameters
     ----------
     records : sequence of Record
-        In experiment order.
+        In experiment order; the drive range is that of all of them.
     residuals : sequence of (n,) ndarray
         Measured minus simulated displacement [m].
     floors : sequence of float
@@ -80,14 +112,15 @@ def localise(
     total = sum(float(p.sum()) for p in power)
     if total == 0.0:
         return ()
-    span = max(float(r.voltage.max()) for r in records) - min(float(r.voltage.min()) for r in records)
+    lowest = min(float(r.voltage.min()) for r in records)
+    span = max(float(r.voltage.max()) for r in records) - lowest
     end = max(r.start_time + r.duration for r in records)
     places = [_phases(records, power), _frequencies(records, residuals, floors)]
     axes: dict[str, list[Bins]] = {
         axis: [] for axis in ("amplitude", "direction", "turning_point_distance", "time_since_level_change")
     }
     for record in records:
-        for axis, index in _drive_bins(record, span).items():
+        for axis, index in _drive_bins(record, lowest, span).items():
             axes[axis].append(index)
     for axis, bins in axes.items():
         places.append(_gather(axis, bins, power, _labels(axis)))
@@ -165,10 +198,9 @@ def _between(low: str, high: str, unit: str) -> str:
     return f"{low} {unit} or more" if high == "inf" else f"{low} to {high} {unit}"
 
 
-def _drive_bins(record: Record, span: float) -> dict[str, Bins]:
+def _drive_bins(record: Record, lowest: float, span: float) -> dict[str, Bins]:
     u = record.voltage
     scale = max(span, 1e-300)
-    low = min(float(u.min()), 0.0)
     steps = np.diff(u, prepend=record.settled_voltage)
     moving = np.abs(steps) > 1e-6 * scale
     sign = np.where(moving, np.sign(steps), 0.0)
@@ -181,7 +213,7 @@ def _drive_bins(record: Record, span: float) -> dict[str, Bins]:
     idle = np.where(~moving & (last_move >= 0), since, -1.0)
     times = np.searchsorted(EDGES["time_since_level_change"], np.maximum(idle, 0.0), side="right") - 1
     return {
-        "amplitude": np.clip((10 * (u - low) / scale).astype(int), 0, 9),
+        "amplitude": np.clip((10 * (u - lowest) / scale).astype(int), 0, 9),
         "direction": (sign + 1).astype(int),
         "turning_point_distance": np.clip((10 * np.abs(u - u[turn]) / scale).astype(int), 0, 9),
         "time_since_level_change": np.where(

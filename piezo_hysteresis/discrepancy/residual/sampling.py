@@ -200,6 +200,6 @@ def _interpolated(record: Record, period: float) -> Record:
     then = period * np.arange(int(now[-1] / period * (1.0 + 1e-12)) + 1)
 
     def spline(channel: Array) -> Array:
-        return np.asarray(scipy.interpolate.make_interp_spline(now, channel)(then))
+        return np.asarray(scipy.interpolate.make_interp_spline(now, channel, min(3, record.size - 1))(then))
 
     return record.with_channels(spline, sample_period=period, initial_voltage=record.settled_voltage)

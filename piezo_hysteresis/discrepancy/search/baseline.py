@@ -71,7 +71,7 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
     loops = [i for i in roles.loops if i in fitted]
     broadband, moving = _telling_dynamics(roles, fitted, at_full_rate)
     if not loops or not broadband:
-        yield identify(_fitted_only(experiment, fitted)).model
+        yield identify(_fitted_only(experiment, fitted), held_out=()).model
         return
     fast = [records[i] for i in at_full_rate]
     try:

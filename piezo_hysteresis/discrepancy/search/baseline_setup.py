@@ -48,7 +48,7 @@ from .training_data import TrainingData
 Array = NDArray[np.float64]
 
 SEARCHED, FITTED = 6_000, 50_000
-"""Number of samples of a fast record in the search, and in the last fit."""
+"""Largest number of samples of a record, approximately, in the search and in the last fit."""
 UNSURE = 0.3
 """Share of the inter-sample error that is added to the floor; the correction removes the rest."""
 
@@ -98,7 +98,7 @@ class BaselineSetup:
 
     @property
     def whole(self) -> tuple[Record, ...]:
-        """The training records in full length."""
+        """The training records of the last fit, averaged or cut to about `FITTED` samples where they are longer."""
         return tuple(select_records(shortened(self.records, FITTED), self.least.tolist(), self.fitted)[0])
 
     @property
@@ -170,7 +170,8 @@ def prepare_baseline(
     baseline = joint(start, training_data, LAST, PRECISE)
     lost = [np.zeros(r.size) for r in records]
     if corrects_intersample_error:
-        lost = intersample_error(known.model if known is not None else baseline.model, records)
+        with suppress(DivergenceError):  # on a test record, which moves further than those that were fitted
+            lost = intersample_error(known.model if known is not None else baseline.model, records)
     if any(c.any() for c in lost):
         records = less(records, lost)
         least = np.hypot(least, [UNSURE * np.sqrt(np.mean(c**2)) for c in lost])
@@ -180,7 +181,7 @@ def prepare_baseline(
     training_data, score = score_baseline(baseline.model, training_data)
     if score.excess > ADEQUATE:
         start_helpers()  # effects will be searched for
-        baseline, score = _best(baseline, score, starts, training_data)
+        baseline, score = best_of_starts(baseline, score, starts, training_data)
     if score.excess > ADEQUATE:
         for modal in modal_models(baseline.model, records, fitted):
             baseline, score = clearly_better(modal, baseline, score, training_data) or (baseline, score)
@@ -189,10 +190,13 @@ def prepare_baseline(
     )
 
 
-def _best(found: Fit, score: Score, starts: Iterator[Model], training_data: TrainingData) -> tuple[Fit, Score]:
-    """The fit and its score, or those from another start if cross-validation and fit are better."""
-    with suppress(*FAILURES):
-        for start in map(exact, starts):
+def best_of_starts(found: Fit, score: Score, starts: Iterator[Model], training_data: TrainingData) -> tuple[Fit, Score]:
+    """The fit and its score, or those from another start if cross-validation and fit are better.
+
+    A start from which the fit fails is left out.
+    """
+    for start in map(exact, starts):
+        with suppress(*FAILURES):
             if score_model(start, training_data).cost < score.cost:
                 other = joint(start, training_data, LAST, PRECISE)
                 if other.cost < found.cost:

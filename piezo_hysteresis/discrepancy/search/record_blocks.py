@@ -22,6 +22,7 @@ import numpy as np
 
 from ...effects.extent import Extent
 from ...identification.fit.normal_equations import Nuisance
+from ...identification.records.conditioning import with_conditioning
 from ...identification.records.leading_step import step_length
 from ...model.model import Model
 from ...record import Record
@@ -60,6 +61,8 @@ def training_data_of(
 def blocks_of(records: Sequence[Record], used: Collection[int]) -> tuple[list[Record], list[int | None]]:
     """Blocks of the records `used`, a leading jump apart, and the record of each (None: it only sets the state).
 
+    Records that none of them continues are left out.
+
     Parameters
     ----------
     records : sequence of Record
@@ -70,7 +73,8 @@ def blocks_of(records: Sequence[Record], used: Collection[int]) -> tuple[list[Re
     length = max(FEWEST, sum(records[i].size for i in used) // BLOCKS)
     blocks: list[Record] = []
     origin: list[int | None] = []
-    for index, record in enumerate(records):
+    for index in with_conditioning(records, used):
+        record = records[index]
         if index not in used:
             blocks.append(record)
             origin.append(None)

@@ -29,9 +29,10 @@ import numpy as np
 from ...effects import Effect
 from ...errors import PiezoError
 from ...identification.fit.fit import Fit, Progress
-from ...identification.fit.normal_equations import Nuisance, residuals
+from ...identification.fit.normal_equations import Nuisance
 from ...identification.identification import Identification
 from ...identification.identify import identify
+from ...identification.records.conditioning import with_conditioning
 from ...identification.structure.left_out import has_several_drives, score_left_out
 from ...model.model import Model
 from ...model.provenance import provenance
@@ -40,10 +41,10 @@ from ..diagnosis import Conclusion, Diagnosis
 from ..excitation_check import missing_excitation
 from ..gap import Gap, measure_gap, with_stated_error
 from ..next_experiment import best_next_experiment
-from ..residual.localise import localise
+from ..residual.localise import located
 from ..residual.noise_floor import floors, noise_floors, stroke
 from ..residual.sampling import shortened
-from ..verdict import FEWEST_RECORDS, NAMED, conclusion_of
+from ..verdict import FEWEST_RECORDS, MORE_MAY_BE_MISSING, conclusion_of, is_explained
 from .baseline import with_zero
 from .candidates import loop_is_off, score_model
 from .cross_validation import ADEQUATE, Score
@@ -103,11 +104,11 @@ def diagnose_few(
     fitted = [i for i in used if i not in aside]
     known = _without(experiment, aside)
     progress("baseline", 0.1)
-    published = model or identify(known, progress=lambda word, part: progress(word, 0.1 + 0.1 * part)).model
-    found = None
-    if model is None:
-        found = identify(known, memory=True, progress=lambda word, part: progress(word, 0.2 + 0.3 * part))
-    start = model or (found.model if found else published)
+    published, found = model, None
+    if published is None:  # which records are not fitted was decided above
+        published = identify(known, held_out=(), progress=lambda word, part: progress(word, 0.1 + 0.1 * part)).model
+        found = identify(known, held_out=(), memory=True, progress=lambda w, part: progress(w, 0.2 + 0.3 * part))
+    start = found.model if found else published
     noise = noise_floors(records)
     least = floors(records, noise)
     short = shortened(records, SEARCHED)
@@ -118,31 +119,32 @@ def diagnose_few(
     if before.excess > ADEQUATE:
         start_helpers()  # effects will be searched for
     progress("location of the residual", 0.5)
-    left = residuals(baseline.model, records, Nuisance(offset=True))
-    where = localise([records[i] for i in fitted], [left[i] for i in fitted], [least[i] for i in fitted])
+    where = located(baseline.model, records, fitted, least.tolist(), Nuisance(offset=True))
 
     steps: list[Step] = []
     now, score = (found.fit, score_model(start, training_data)) if found else (baseline, before)
-    if found and found.structure and before.excess > ADEQUATE and has_several_drives(records, fitted):
+    several = has_several_drives(records, fitted)
+    if found and found.structure and before.excess > ADEQUATE and several:
         steps = structure_steps(found, before, training_data, short, least.tolist(), fitted)
     fitting = [e for e in effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
     with ending_at(end):
         more = select(
             now.model, training_data, score, null, fitting, lambda word, part: progress(word, 0.6 + 0.3 * part)
         )
-    final, accepted = _delivered(more, now, model, found, records, least.tolist(), fitted)
+    chosen = sorted(aside or fitted)
+    final, accepted = _delivered(more, now, model, found, records, least.tolist(), fitted, chosen)
     further = more.steps if accepted else tuple(replace(s, accepted=False) for s in more.steps)
     reached = more.score if accepted else score
     selection = Selection(baseline.model, final.model, reached, (*steps, *further), null, more.in_time)
 
     progress("gap", 0.9)
-    chosen = sorted(aside or fitted)
     free = Nuisance(offset=True), replace(final.nuisance, offset=True)
     first = model or baseline.model  # the gap of a given model is measured before any refit
     models = first, final.model
     gap = measure_gap(models, records, chosen, least.tolist(), stroke(records), free, bool(aside))
-    missing = missing_excitation([records[i] for i in used])
-    conclusion, reason = _conclusion(selection, steps, before, gap, len(used), missing)
+    shown = {s.best.effect.public_name() for s in selection.accepted}
+    missing = missing_excitation([records[i] for i in used], shown)
+    conclusion, reason = conclusion_of_few(selection, bool(steps), before, gap, len(used), several, missing)
     delivered = replace(final.model, provenance={**final.model.provenance, **provenance(experiment, 0.0, 0.0)})
     return Diagnosis(
         conclusion=conclusion,
@@ -172,8 +174,12 @@ def _delivered(
     records: Sequence[Record],
     least: Sequence[float],
     fitted: Collection[int],
+    tested: Sequence[int],
 ) -> tuple[_Delivered, bool]:
-    """The model that predicts rates, amplitudes and records left out best; a given model stays if none is better."""
+    """The model that predicts rates, amplitudes and records left out best; a given model stays if none is better.
+
+    A model that diverges on a test record is not taken.
+    """
     free = Nuisance(offset=True)
     if found is not None:
         start = _Delivered(found.model, found.fit, free)
@@ -189,6 +195,7 @@ def _delivered(
         for contender in contenders:
             try:
                 score = score_left_out(contender.model, records, least, fitted)
+                contender.model.free_run([records[i] for i in with_conditioning(records, tested)])
             except PiezoError:
                 continue
             if score < reached - EXTENDS:
@@ -197,24 +204,34 @@ def _delivered(
     return best, extended
 
 
-def _conclusion(
-    selection: Selection, decided: Sequence[Step], before: Score, gap: Gap, count: int, missing: Sequence[Notice]
+def conclusion_of_few(
+    selection: Selection, decided: bool, before: Score, gap: Gap, count: int, several: bool, missing: Sequence[Notice]
 ) -> tuple[Conclusion, str]:
-    """The conclusion and its reason."""
+    """The conclusion and its reason.
+
+    A small error of the extended model is no evidence that nothing is missing in the published one. One rate and one
+    amplitude can be explained by wrong effects.
+    """
+    named = gap.falls and (decided or (count >= FEWEST_RECORDS and several and is_explained(selection)))
+    if not selection.in_time and not named:
+        return conclusion_of(selection, named, gap.falls, gap)
     closed = explained(before.excess, selection.score.excess, selection.null)
     names = [s.best.effect.public_name() for s in selection.accepted]
-    if decided and gap.falls:
+    if decided and named:
         rivals = [n for s in selection.accepted for n in s.confusable_with]
         said = (
             f"The model does not contain {' and '.join(names)}. An extended model predicts rates, amplitudes and "
             f"records better that were left out of the fit; it explains {100 * closed:.0f} % of the gap."
         )
         alike = f" These data cannot distinguish {' or '.join(rivals)} from it." if rivals else ""
-        return Conclusion.MISSING_EFFECT, said + alike
-    if count >= FEWEST_RECORDS and not decided:
-        named = bool(selection.accepted) and gap.falls and closed >= NAMED
-        return conclusion_of(selection, named, gap.falls, gap)
-    if before.excess <= ADEQUATE:
+        return Conclusion.MISSING_EFFECT, said + alike + ("" if selection.in_time else MORE_MAY_BE_MISSING)
+    is_adequate = before.excess <= ADEQUATE
+    if count >= FEWEST_RECORDS and not decided and (several or is_adequate):
+        judged = replace(gap, after=gap.before) if is_adequate and not named else gap  # of the published model
+        conclusion, reason = conclusion_of(selection, named, gap.falls, judged)
+        if is_adequate or conclusion is not Conclusion.NOTHING_MISSING:
+            return conclusion, reason
+    if is_adequate:
         message = "the error of the published model is at the noise floor, so the data cannot show further effects"
     elif names:
         message = (
@@ -226,7 +243,7 @@ def _conclusion(
             "the saved model has the structure that predicts best in cross-validation; it explains "
             f"{100 * closed:.0f} % of the gap of the published model"
         )
-    records = "one record" if count == 1 else f"{count} records"
+    records = ("one record" if count == 1 else f"{count} records") + ("" if several else " of one rate and amplitude")
     reason = "; ".join(
         (f"No effect is named, because {records} cannot distinguish effects", message, *(n.message for n in missing))
     )

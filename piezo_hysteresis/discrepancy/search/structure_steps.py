@@ -61,11 +61,15 @@ FEW = 8
 
 
 def decided(found: Identification) -> list[str]:
-    """Effects of the chosen structure that cross-validation clearly requires, largest first."""
+    """Effects of the chosen structure that cross-validation clearly requires, largest first.
+
+    A level dependence of plays is certain only if the plays are: the operator may need no such term.
+    """
     if found.structure is None:
         return []
     leads = found.structure.leads
-    return [n for n in ORDER if leads.get(n, 0.0) >= DECIDES and n in found.model]
+    certain = [n for n in ORDER if leads.get(n, 0.0) >= DECIDES and n in found.model]
+    return [n for n in certain if n != MEMORY.level_term.name or MEMORY.name in certain]
 
 
 def structure_steps(

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from ...record import Record
+from ..excitation_check import moves
 
 SHARE = 3
 """Number of records of a kind per test record."""
@@ -28,7 +29,8 @@ def reporting(records: Sequence[Record], usable: Collection[int]) -> tuple[int, 
     """Indices of the test records.
 
     If a kind of phase has at least three realisations, one in three is a test record, from the middle of the list, so
-    that the extremes of amplitude and frequency are fitted. All phases named ``validation`` are test records.
+    that the extremes of amplitude and frequency are fitted. All phases named ``validation`` are test records, unless
+    the drive moves in no other record.
 
     Parameters
     ----------
@@ -41,7 +43,7 @@ def reporting(records: Sequence[Record], usable: Collection[int]) -> tuple[int, 
     for index in usable:
         kinds.setdefault(records[index].phase.split("_")[0], []).append(index)
     validation = kinds.pop("validation", [])
-    if len(validation) == len(usable):
+    if not any(moves(records[i]) for members in kinds.values() for i in members):
         return ()
     chosen = [i for members in kinds.values() for i in members[SHARE // 2 :: SHARE][: len(members) // SHARE]]
     return tuple(sorted(chosen + validation))

@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 
 LEVELS_APART = 0.05
 """Smallest difference between two initial levels of records, as a share of the voltage range."""
+MOST_PEAKS = 3
+"""Largest number of peaks in the residual from which a resonance starts."""
 MOVES = 30.0
 """Power over noise from which the spectrum of the displacement counts as motion."""
 
@@ -95,7 +97,7 @@ class TrainingData:
         return replace(self, nuisance=replace(self.nuisance, hum_frequency=None)) if effect == MainsHum.name else self
 
 
-def peaks_of(records: Sequence[Record], left: Sequence[Array], most: int = 3) -> tuple[float, ...]:
+def peaks_of(records: Sequence[Record], left: Sequence[Array]) -> tuple[float, ...]:
     """Frequencies with the largest ratio of residual to displacement [Hz], as start values of a resonance.
 
     Only frequencies are used at which the motion is well above the noise at the top of the band.
@@ -120,4 +122,4 @@ def peaks_of(records: Sequence[Record], left: Sequence[Array], most: int = 3) ->
     noise = float(np.median(power[frequency > 0.3 / period]))
     ratio = np.where(reach > MOVES * noise, np.maximum(power - noise, 0.0) / reach, 0.0)
     tops = 1 + np.flatnonzero((ratio[1:-1] > ratio[:-2]) & (ratio[1:-1] >= ratio[2:]))
-    return tuple(float(frequency[k]) for k in tops[np.argsort(-ratio[tops])][:most])
+    return tuple(float(frequency[k]) for k in tops[np.argsort(-ratio[tops])][:MOST_PEAKS])

@@ -27,6 +27,8 @@ from .normal_equations import Gram, Nuisance, residuals
 
 Array = NDArray[np.float64]
 
+BLOCKS = 64
+"""Number of blocks of a residual whose means show its colour."""
 UNKNOWN = 1e-10
 """Relative curvature below which a direction of the parameters is undetermined; it gets the variance of this value."""
 
@@ -99,15 +101,15 @@ def sandwich(bread: Array, meat: Array, directions: Array) -> Array:
     return np.asarray(half @ half.T + free @ free.T)
 
 
-def colour(residual: Array, blocks: int = 64) -> float:
+def colour(residual: Array) -> float:
     """Ratio of the slow part of a residual to that of white noise of the same variance, at least 1.
 
     It is the variance of block means over its value for white noise. Values up to 1.7 (three standard deviations for 64
     blocks) count as white.
     """
-    length = residual.size // blocks
+    length = residual.size // BLOCKS
     if length < 2:
         return 1.0
-    means = residual[: blocks * length].reshape(blocks, length).mean(axis=1)
+    means = residual[: BLOCKS * length].reshape(BLOCKS, length).mean(axis=1)
     ratio = float(means.var() * length / max(residual.var(), 1e-300))
     return ratio if ratio > 1.7 else 1.0

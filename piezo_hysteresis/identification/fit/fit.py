@@ -54,7 +54,7 @@ class Fit:
     covariance : (q, q) ndarray
         Covariance of the free parameters, from residual variance and colour of every record.
     cost : float
-        Mean over the records of (RMS residual / floor)².
+        Mean of (RMS residual / floor)² over the records with a finite floor.
     rms : tuple of float
         RMS residual of every record [m].
     nuisances : tuple of ndarray
@@ -128,9 +128,12 @@ def gauge(model: Model, names: Sequence[str]) -> Array:
 
 
 def weighted(grams_: Sequence[Gram], floors: Array) -> Array:
-    """Mean over the records of Gram/(size·floor²): every record has the same weight."""
+    """Mean over the records of Gram/(size·floor²): every record has the same weight.
+
+    A record with an infinite floor only determines the state of the next one, and is not counted.
+    """
     total: Array = sum(g.matrix / (g.size * f * f) for g, f in zip(grams_, floors, strict=True))
-    return total / len(grams_)
+    return total / np.isfinite(floors).sum()
 
 
 def fit(
@@ -159,7 +162,7 @@ def fit(
     free : sequence of str
         Parameters to fit, e.g. ``"bouc_wen.beta"``, ``"arx.a[0]"``.
     floors : sequence of float, optional
-        Floor of the residual of every record [m]; default 1 for all.
+        Floor of the residual of every record [m]; default 1 for all, infinite for one that only determines the state.
     nuisance : Nuisance, optional
         Disturbances that are free in every record.
     max_iterations : int
@@ -255,6 +258,7 @@ def _try(
     try:
         candidate = model.with_values(dict(zip(free, trial.tolist(), strict=True)))
         left = residuals(candidate, records, nuisance)
-        return candidate, float(np.mean([e @ e / (e.size * f * f) for e, f in zip(left, floors, strict=True)]))
+        squares = [e @ e / (e.size * f * f) for e, f in zip(left, floors, strict=True) if np.isfinite(f)]
+        return candidate, float(np.mean(squares))
     except (DivergenceError, ParameterError):
         return None, np.inf

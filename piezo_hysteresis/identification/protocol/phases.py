@@ -29,6 +29,8 @@ CORNERED = 1e-4
 """Longest stored sample period [s] of loops with sharp turning points, because averaging flattens them."""
 HIGHEST = 0.2
 """Highest frequency of noise and multisine as a share of the sample rate; sines reach twice that."""
+FEWEST = 4
+"""Smallest number of samples of a noise phase: one period of one line."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -114,7 +116,9 @@ class Phases:
         self.add("steps", body)
 
     def noise(self, rms: float, duration: float) -> None:
-        """Band-limited noise of `rms` of the range."""
+        """Band-limited noise of `rms` of the range; nothing if `duration` [s] has too few samples for one period."""
+        if self.limits.samples(duration) < FEWEST:
+            return
         bandwidth = HIGHEST / self.limits.sample_period
         seed = self.next_seed()
         self.add("noise", excitation.noise(self.limits, rms, bandwidth, duration, centre=0.35, seed=seed))

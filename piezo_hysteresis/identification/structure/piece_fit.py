@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 
 STIFF = 1e-9
 """Damping that keeps undetermined directions at their start, as a share of the diagonal."""
+FIRST_DAMPING = 1e-6
+"""Damping of the first step, as a share of the diagonal."""
 FARTHEST = 1e10
 """Damping at which the search gives up."""
 LARGEST_POLE = 0.999
@@ -161,7 +163,6 @@ def fit_pieces(
     floors: Sequence[float],
     names: Sequence[str],
     max_iterations: int = 25,
-    damping: float = 1e-6,
 ) -> PieceFit:
     """Fit the parameters `names` by damped Gauss-Newton steps inside their bounds.
 
@@ -177,10 +178,8 @@ def fit_pieces(
         Free numbers.
     max_iterations : int
         Largest number of linearisations.
-    damping : float
-        Damping of the first step, as a share of the diagonal.
     """
-    names = tuple(names)
+    names, damping = tuple(names), FIRST_DAMPING
     matrices, weights = linearised(model, pieces, floors, names)
     now = at_its_cost(model, names, matrices, weights)
     while now.iterations < max_iterations and now.cost > PERFECT:

@@ -23,7 +23,7 @@ one pole and one lightly damped mode, or ARX of higher order where a step shows 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,7 +82,8 @@ class StructureChoice:
         Every structure, best first.
     leads : mapping of str to float
         For every optional effect, the score (mean ln R²) of the best structure without it minus the score of the chosen
-        one, if there are structures without it; empty if the state of the operator was kept.
+        one, if there are structures without it. If the state of the operator was kept, all of them are structures with
+        the operator.
     notices : tuple of Notice
         ``structure``, ``memory``, ``ringing``, ``step_time``.
     """
@@ -130,7 +131,7 @@ def choose_structure(
     final = fit_structure(_reduced(full.model, chosen), pieces, sizes, held)
     progress("structure: rival", 0.85)
     described = "; ".join(f"{_words(j.structure)} {np.exp(0.5 * j.score):.3g}" for j in judged[:3])
-    rival, lead = _rival(start, final, chosen, pieces, sizes)
+    rival, lead = _rival(start, final, pieces, sizes)
     notices = mode_notices(rival or final)
     if abs(late) > LATE:
         later = "later" if late > 0.0 else "earlier"
@@ -147,7 +148,8 @@ def choose_structure(
         message = f"{start.hysteresis.name} predicts data left out better by a factor of {np.exp(0.5 * lead):.3g}"
         notices.append(Notice("memory", f"{message}, so it is used instead of plays"))
         nothing = np.zeros((len(rival.names),) * 2)
-        return StructureChoice(as_fit(rival, pieces, sizes, nothing), tuple(judged), {}, tuple(notices))
+        leads = {ExtraResonance.name: ringing, **_leads_of_operator(start, full, chosen, pieces, sizes)}
+        return StructureChoice(as_fit(rival, pieces, sizes, nothing), tuple(judged), leads, tuple(notices))
     notices.append(Notice("memory", f"{MEMORY.name} is used: the stage remembers its turning points"))
     spread = spread_of(full, final, chosen, judged)
     leads = {MEMORY.name: -lead, ExtraResonance.name: ringing, **_leads(chosen, judged)}
@@ -163,6 +165,19 @@ def _leads(chosen: Judged, judged: Sequence[Judged]) -> dict[str, float]:
         if rest:
             found[name] = min(rest) - chosen.score
     return found
+
+
+def _leads_of_operator(
+    start: Model, full: PieceFit, chosen: Judged, pieces: Sequence[RecordPiece], floors: Sequence[float]
+) -> dict[str, float]:
+    """The leads of the chosen effects beside the operator instead of plays; none if its fit diverges."""
+    try:
+        whole = fit_structure(_with_operator(full.model, start), pieces, floors, held_by(full))
+    except PiezoError:
+        return {}
+    judged = list(judge(whole, pieces, [s for s in _offered(pieces) if not s.level]))
+    kept = replace(chosen.structure, level=False)
+    return _leads(next(j for j in judged if j.structure == kept), judged)
 
 
 def _offered(pieces: Sequence[RecordPiece]) -> list[ModelStructure]:
@@ -210,15 +225,18 @@ def _reduced(model: Model, chosen: Judged) -> Model:
     return model
 
 
+def _with_operator(model: Model, start: Model) -> Model:
+    """The model with the operator of `start` instead of plays."""
+    return model.without(MEMORY.level_term.name).without(MEMORY.name).with_hysteresis(start.hysteresis)
+
+
 def _rival(
-    start: Model, final: PieceFit, chosen: Judged, pieces: Sequence[RecordPiece], floors: Sequence[float]
+    start: Model, final: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]
 ) -> tuple[PieceFit | None, float]:
     """The fit with the operator instead of plays if it predicts clearly better, and the difference of the scores."""
-    model = final.model.without(MEMORY.level_term.name).without(MEMORY.name)
-    model = model.with_hysteresis(start.hysteresis)
     same = ModelStructure(True, 2, True)
     try:
-        rival = fit_structure(model, pieces, floors, held_by(final))
+        rival = fit_structure(_with_operator(final.model, start), pieces, floors, held_by(final))
         lead = next(judge(final, pieces, (same,))).score - next(judge(rival, pieces, (same,))).score
     except PiezoError:
         return None, 0.0

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from ...discrepancy import Diagnosis
 from ...discrepancy.residual.noise_floor import floors, noise_floors
 from ...discrepancy.residual.residual import Errors, errors, zero_per_phase
+from ...errors import DivergenceError
 from ...identification.fit.normal_equations import Nuisance
 from ...model.model import Model
 from ...record import Experiment
@@ -136,7 +137,7 @@ def compare(
 def compare_diagnosis(found: Diagnosis) -> ModelComparison:
     """The experiment of a diagnosis, with the model before and, if an effect or a change was named, after it.
 
-    As in the gap of the answer, the sensor zero of every record is free.
+    As in the gap of the answer, the sensor zero of every record is free. Without a model if one diverges on a record.
     """
     models = {}
     if found.baseline is not None:
@@ -144,4 +145,7 @@ def compare_diagnosis(found: Diagnosis) -> ModelComparison:
     is_named = found.change is not None or (found.selection is not None and bool(found.selection.accepted))
     if is_named and found.model is not None and found.model is not found.baseline:
         models["after"] = found.model
-    return compare(found.experiment, models, {label: zero_per_phase(model) for label, model in models.items()})
+    try:
+        return compare(found.experiment, models, {label: zero_per_phase(model) for label, model in models.items()})
+    except DivergenceError:
+        return compare(found.experiment)

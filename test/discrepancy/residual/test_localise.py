@@ -14,10 +14,16 @@
 
 """Where: each kind of residual concentrates on the axis that reveals it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.residual.localise import localise
+from piezo_hysteresis.discrepancy.residual.localise import localise, located
+from piezo_hysteresis.effects import Arx, Softening
+from piezo_hysteresis.errors import DivergenceError
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 RANDOM = np.random.default_rng(9)
@@ -113,3 +119,24 @@ def test_an_error_just_after_turning_points_shows_there():
 
 def test_zero_residual_has_no_location():
     assert localise(RECORDS, [np.zeros(r.size) for r in RECORDS], [1e-8] * 4) == ()
+
+
+@pytest.mark.parametrize("low", [-40.0, 50.0])
+def test_the_drive_range_of_all_records_is_divided(low):
+    """Also if it does not begin at 0 V, or if a record uses only its upper half."""
+    whole = np.linspace(low, low + 50.0, 1000)
+    records = [Record(u, np.zeros(u.size), 1e-3, "triangle") for u in (whole, whole[500:])]
+    shares = localise(records, [np.zeros(1000), np.ones(500)], [1e-9, 1e-9])
+    (place,) = (p for p in shares if p.axis == "amplitude")
+    assert [share for _, share in place.bins] == pytest.approx([0.0] * 5 + [0.2] * 5, abs=0.01)
+
+
+def test_a_record_that_is_not_used_is_not_simulated():
+    """The model may diverge there; a record that is continued determines the state of the next one."""
+    soft = Model((Arx(a=(-1.5, 0.9), b=(0.4,)), Softening(k3=-0.08)), 1e-3, 1.0, 1e-6)
+    small, far = (Record(np.linspace(0.0, top, 100), np.zeros(100), 1e-3) for top in (0.1, 1e3))
+    with pytest.raises(DivergenceError):
+        located(soft, (small, far), (0, 1), (1e-9, 1e-9), Nuisance())
+    assert located(soft, (small, far), (0,), (1e-9, 1e-9), Nuisance())
+    with pytest.raises(DivergenceError):
+        located(soft, (far, replace(small, continues=True)), (1,), (1e-9, 1e-9), Nuisance())

@@ -137,3 +137,10 @@ def test_the_noise_of_a_drive_is_removed_and_its_motion_kept():
     assert np.abs(quiet - drive).max() < 8.0 * noise
     assert way(noisy) > 1.05 * way(drive)
     assert way(quiet) == pytest.approx(way(drive), rel=0.01)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4])
+def test_records_of_a_few_samples_are_brought_to_another_period(size):
+    few = Record(np.arange(float(size)), np.arange(float(size)), 3 * FAST)
+    found = at_period(few, 10 * FAST)
+    assert found.sample_period == 10 * FAST and found.size == 1 and found.voltage[0] == 0.0

@@ -16,8 +16,15 @@
 
 import numpy as np
 
-from piezo_hysteresis.discrepancy.search.baseline import start_models
+from piezo_hysteresis.discrepancy.search import baseline_setup
+from piezo_hysteresis.discrepancy.search.baseline import exact, start_models
+from piezo_hysteresis.discrepancy.search.cross_validation import Score
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.effects.extent import Extent
+from piezo_hysteresis.errors import DivergenceError
+from piezo_hysteresis.identification.fit.fit import Fit
+from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.steps.linear_start import dynamics_of
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
@@ -34,3 +41,26 @@ def test_noise_that_does_not_determine_the_sign_of_the_gain_gives_a_start():
     backwards = Record(5.0 + noise, -1e-6 * np.roll(noise, 2), PERIOD, "noise")
     for start in start_models((loops, backwards), (0, 1)):
         assert dynamics_of(start).dc_gain > 0.0
+
+
+def test_a_start_from_which_the_fit_fails_hides_no_later_one(monkeypatch):
+    first, second, third = (
+        exact(Model((BoucWen(), Arx(a=(), b=(1.0,), delay=d)), PERIOD, 10.0, 1e-5)) for d in (1, 2, 3)
+    )
+    record = Record(np.arange(100.0), np.zeros(100), PERIOD)
+    training_data = TrainingData((record,), np.ones(1), Nuisance(), Extent.of([record], 10.0, 1e-5))
+
+    def fitted(model, cost):
+        return Fit(model, (), np.empty((0, 0)), cost, (), (), (), True, 1)
+
+    def joint(start, *_):
+        if start is second:
+            raise DivergenceError("arx", 0, 0.0)
+        return fitted(start, 1.0)
+
+    monkeypatch.setattr(baseline_setup, "joint", joint)
+    monkeypatch.setattr(baseline_setup, "exact", lambda model: model)
+    monkeypatch.setattr(baseline_setup, "score_model", lambda model, _: Score(np.ones(4), np.zeros(1)))
+    poor = Score(np.full(4, 5.0), np.zeros(1))
+    found, _ = baseline_setup.best_of_starts(fitted(first, 25.0), poor, iter((second, third)), training_data)
+    assert found.model is third

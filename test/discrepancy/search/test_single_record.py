@@ -14,13 +14,19 @@
 
 """Records of a step and growing sines, without noise phases: the best model that is known is the least delivered."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
-from piezo_hysteresis.discrepancy import Verdict, diagnose
+from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
+from piezo_hysteresis.discrepancy.gap import Gap, PhaseGap
 from piezo_hysteresis.discrepancy.residual.residual import errors
-from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.discrepancy.search.cross_validation import Score
+from piezo_hysteresis.discrepancy.search.selection_result import Selection
+from piezo_hysteresis.discrepancy.search.single_record import conclusion_of_few
+from piezo_hysteresis.effects import Arx, Backlash, BoucWen, Creep, Effect, ThermalDrift
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.model.model import Model
@@ -28,6 +34,7 @@ from piezo_hysteresis.record import Experiment, Record
 
 PERIOD = 5e-4
 STAGE = Nanopositioner(mode=310.0, delay=2e-4, pole=2e-4)
+SLOW_PERIOD = 1e-3
 HIDDEN = {"hysteresis_memory", "level_dependent_memory", "creep", "even_input_polynomial", "extra_resonance"}
 
 
@@ -75,3 +82,63 @@ def test_a_truncated_record_is_diagnosed_after_its_first_full_loop():
     found = diagnose(Experiment((cut,)))
     assert any(n.kind == "conditioning_length" for n in found.experiment.notices)
     assert found.gap.after < 0.2
+
+
+def sines(*frequencies: float, samples: int = 6000, hidden: Effect | None = None) -> list[Record]:
+    """Sines without a step, of a stage of the published form and one more effect."""
+    chain = (BoucWen(), Arx(a=(-0.5,), b=(0.5,), delay=1.0), *([] if hidden is None else [hidden]))
+    stage, rng = Model(chain, SLOW_PERIOD, 10.0, 1e-5), np.random.default_rng(0)
+    time = SLOW_PERIOD * np.arange(samples)
+    drives = [5.0 - 4.0 * np.cos(2.0 * np.pi * f * time) for f in frequencies]
+    gap = 1.1 * SLOW_PERIOD * samples
+    still = [
+        Record(u, np.zeros(u.size), SLOW_PERIOD, f"sine_{f:g}hz", start_time=k * gap)
+        for k, (u, f) in enumerate(zip(drives, frequencies, strict=True))
+    ]
+    moved = stage.free_run(still)
+    return [replace(r, displacement=y + 3e-9 * rng.normal(size=y.size)) for r, y in zip(still, moved, strict=True)]
+
+
+@pytest.fixture(scope="module")
+def creeping() -> list[Record]:
+    return sines(0.25, 0.5, 5.0, 20.0, samples=8000, hidden=Creep(gamma=0.1))
+
+
+def test_creep_beside_the_published_loop_is_named(creeping):
+    """Plays do not describe such a stage, so the choice of a structure keeps the operator."""
+    found = diagnose(creeping)
+    assert found.names == ("creep",)
+    assert found.gap.after < 0.1 * found.gap.before
+    assert not any("creep" in n.message for n in found.experiment.notices if n.kind == "not_tested")
+
+
+def test_the_time_limit_is_the_conclusion_if_it_ended_the_search(creeping):
+    given = Model((BoucWen(), Arx(a=(-0.5,), b=(0.5,), delay=1.0)), SLOW_PERIOD, 10.0, 1e-5)
+    assert diagnose(creeping[:3], given, time_limit=1e-6).conclusion is Conclusion.TIME_LIMIT
+
+
+def test_one_rate_and_one_amplitude_get_no_name():
+    found = diagnose(sines(*[1.0] * 5, hidden=Backlash(b=0.15)))
+    assert found.conclusion is Conclusion.INSUFFICIENT_DATA
+    assert "5 records of one rate and amplitude" in found.reason
+
+
+def test_an_error_of_the_published_model_on_test_records_is_not_nothing_missing():
+    """The structure that is chosen may describe them, but it is not the published model."""
+    found = diagnose(sines(*[1.0] * 5, hidden=ThermalDrift(D=3e-7, tau=30.0)))
+    assert found.gap.before > 2.0 * found.gap.floor
+    assert found.conclusion is Conclusion.INSUFFICIENT_DATA
+
+
+def test_nothing_is_missing_in_sines_of_a_published_stage():
+    assert diagnose(sines(*[1.0] * 5)).conclusion is Conclusion.NOTHING_MISSING
+
+
+def test_a_structure_that_fits_does_not_show_that_nothing_is_missing():
+    """Without evidence for a single effect there is no verdict on the published model, which is far off."""
+    near, far = Score(np.full(4, 0.5), np.zeros(1)), Score(np.full(4, 50.0), np.zeros(1))
+    model = Model((BoucWen(),), SLOW_PERIOD, 10.0, 1e-5)
+    gap = Gap(1.8, 0.02, 0.03, None, (PhaseGap("sine", 0, 1.8, 0.02, 0.03),), True, 0.02)
+    reached = Selection(model, model, near, (), 0.2)
+    conclusion, reason = conclusion_of_few(reached, False, far, gap, 4, True, ())
+    assert conclusion is Conclusion.INSUFFICIENT_DATA and "explains" in reason

@@ -41,6 +41,11 @@ def test_every_kind_stays_in_the_fit_and_validation_never_is(phases):
         assert {i for i, p in enumerate(phases) if p == "validation"} <= set(spared)
 
 
+def test_validation_is_fitted_if_nothing_else_moves():
+    rest = Record(np.zeros(3), np.zeros(3), 1e-3, phase="rest")
+    assert reporting([*records(["validation"] * 4), rest], range(5)) == ()
+
+
 def test_one_in_three_of_a_kind_and_not_its_extremes():
     phases = [f"sine_{f}hz" for f in (1, 50, 100, 200, 300, 400)] + ["noise", "noise"]
     assert reporting(records(phases), range(8)) == (1, 4)
