@@ -24,7 +24,7 @@ from benchmarks.wire import LSB, SAFE_WITHIN, WiredSession, check_wire, device, 
 from piezo_hysteresis.acquisition.session import DriverSession
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.record import Record
-from piezo_hysteresis.stage.daqmx.tasks import DaqmxError
+from piezo_hysteresis.stage.daqmx.daqmx_error import DaqmxError
 from piezo_hysteresis.stage.gcs2.connection import Gcs2Error
 
 pytestmark = pytest.mark.device
