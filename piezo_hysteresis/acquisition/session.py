@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..errors import PiezoError, StageError
@@ -77,7 +78,9 @@ class DriverSession:
         self._lock = StageLock([place])
         self._keeper: KeeperLink | None = None
         self._acquisition: StreamingAcquisition | None = None
-        opening = Opening(settings.sample_period, settings.real_time_factor, **({"read": read} if read else {}))
+        opening = Opening(settings.sample_period, settings.real_time_factor)
+        if read is not None:
+            opening = replace(opening, read=read)
         try:
             self.stage = open_stage(settings.stage, values, opening, self._lock_device)
         except BaseException:
