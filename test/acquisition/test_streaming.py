@@ -176,6 +176,25 @@ def test_a_device_with_its_own_clock_sets_the_rate_and_the_stamps():
     assert acquisition.make_safe(30.0)
 
 
+@pytest.mark.parametrize("buffered", [False, True])
+def test_a_waveform_that_a_fault_ends_is_reported_as_stopped_with_the_reason(buffered):
+    """Also one that was put out completely, if its last samples were still in the buffer of the device."""
+    stage = OwnClock(1.0, lead=0.4) if buffered else Witness(PERIOD, RAMP_RATE)
+    acquisition, listener = started(stage, rate=1.0)
+    play(acquisition, np.zeros(100), "first")
+    listener.wait(lambda heard: "first" in heard.events(EventKind.DONE))
+    play(acquisition, np.zeros(100 if buffered else 100_000), "second")
+    if buffered:
+        listener.wait(lambda heard: not acquisition.playback.is_playing)
+    stage._fails_at = stage._calls + 2
+    listener.wait(lambda heard: heard.failures)
+    assert acquisition.make_safe(30.0)
+    assert listener.events(EventKind.DONE) == ["first"]
+    assert listener.events(EventKind.STOPPED) == ["second"]
+    assert listener.deliveries[-1].events[-1].reason == "witness: link lost"
+    assert np.array_equal(listener.joined("index"), np.arange(acquisition.index)), "no sample is made up"
+
+
 def test_after_a_long_stall_stamps_move_and_samples_do_not():
     acquisition, listener = started(Witness(PERIOD, RAMP_RATE), rate=1.0)
     acquisition.patience = -1.0
