@@ -43,6 +43,10 @@ _KEEPER_TIME = 10.0
 """Longest wait for the keeper of a stage that this driver could not make safe, in addition to two ramps [s]."""
 
 
+_STREAMING: set[DriverSession] = set()
+"""Sessions that use their stage. Lock and stage are kept also if nobody refers to a session whose stage hangs."""
+
+
 class DriverSession:
     """An opened stage. It streams samples between `start` and `make_safe`, which may be repeated until `close`.
 
@@ -78,6 +82,7 @@ class DriverSession:
         self._lock = StageLock([place])
         self._keeper: KeeperLink | None = None
         self._acquisition: StreamingAcquisition | None = None
+        self._is_stuck = False
         opening = Opening(settings.sample_period, settings.real_time_factor)
         if read is not None:
             opening = replace(opening, read=read)
@@ -110,7 +115,18 @@ class DriverSession:
         fail: Callable[[PiezoError], None],
         subscribers: Callable[[], int],
     ) -> StreamingAcquisition:
-        """Begin to stream at the present voltage; see `StreamingAcquisition` for the parameters."""
+        """Begin to stream at the present voltage; see `StreamingAcquisition` for the parameters.
+
+        Raises
+        ------
+        StageError
+            If the acquisition that was started before still uses the stage.
+        """
+        if self._acquisition is not None and self._acquisition.is_running:
+            raise StageError(
+                f"{self.limits.name}: the acquisition that was started before still uses the stage; stop it first, or "
+                "end this program if a call of the stage does not return"
+            )
         settings = self.settings
         wanted = self._values.get("subscribers", 0)
         arguments = (
@@ -129,6 +145,7 @@ class DriverSession:
             acquisition = StreamingAcquisition(*arguments)
         else:
             acquisition = MemoryAcquisition(*arguments, rest_period=1 / settings.live_rate)
+        _STREAMING.add(self)
         acquisition.start()
         self._acquisition = acquisition
         return acquisition
@@ -140,17 +157,7 @@ class DriverSession:
 
     def in_force(self) -> dict[str, float | str | bool]:
         """The values in use, by the names of `IN_FORCE`."""
-        limits, settings = self.limits, self.settings
-        return {
-            "stage": limits.name,
-            "sample_period": self.sample_period,
-            "voltage_min": limits.voltage_min,
-            "voltage_max": limits.voltage_max,
-            "safe_voltage": limits.safe_voltage,
-            "max_slew_rate": limits.max_slew_rate,
-            "ramp_rate": settings.ramp_rate,
-            "stopped": self.latch.is_set,
-        }
+        return self.settings.in_force(self.limits, self.sample_period) | {"stopped": self.latch.is_set}
 
     def _lock_device(self, found: Description) -> None:
         if BACK_ENDS[self.settings.stage].is_device:
@@ -197,9 +204,10 @@ class DriverSession:
         """
         if self._acquisition is None:
             return
-        timeout = self._longest_step()
+        timeout = 0.0 if self._is_stuck else self._longest_step()
         reached = self._acquisition.make_safe(timeout)
-        if self._acquisition.is_running:
+        self._is_stuck = self._acquisition.is_running
+        if self._is_stuck:
             if self._keeper is not None:
                 self._keeper.abandon()
             raise StageError(
@@ -208,6 +216,7 @@ class DriverSession:
                 "program, and switch the amplifier off by hand"
             )
         self._acquisition = None
+        _STREAMING.discard(self)
         self.stage.safe()  # ends the stream of a device
         if not reached:
             raise StageError(
