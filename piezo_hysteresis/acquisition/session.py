@@ -120,13 +120,16 @@ class DriverSession:
         Raises
         ------
         StageError
-            If the acquisition that was started before still uses the stage.
+            If the acquisition that was started before still uses the stage, or a stage that was left outside the limits
+            cannot be brought to its safe voltage.
         """
         if self._acquisition is not None and self._acquisition.is_running:
             raise StageError(
                 f"{self.limits.name}: the acquisition that was started before still uses the stage; stop it first, or "
                 "end this program if a call of the stage does not return"
             )
+        if self._is_outside:
+            self.stage.safe()  # no waveform may begin there
         settings = self.settings
         wanted = self._values.get("subscribers", 0)
         arguments = (
@@ -153,7 +156,18 @@ class DriverSession:
     @property
     def notices(self) -> tuple[str, ...]:
         """Sentences about the stage that a user should read before it moves."""
-        return self.stage.notices if isinstance(self.stage, ReplayStage) else ()
+        if isinstance(self.stage, ReplayStage):
+            return self.stage.notices
+        low, high, safe = self.limits.voltage_min, self.limits.voltage_max, self.limits.safe_voltage
+        ramp = f"found at {self.stage.voltage:g} V, outside {low:g} to {high:g} V; the start ramps it to {safe:g} V"
+        return (f"{self.limits.name}: {ramp}, the safe voltage",) if self._is_outside else ()
+
+    @property
+    def _is_outside(self) -> bool:
+        """Whether a stream could not begin at the voltage at which another program has left the stage."""
+        limits = self.limits
+        streams = limits.streaming and not limits.ignores_drive
+        return streams and not limits.voltage_min <= self.stage.voltage <= limits.voltage_max
 
     def in_force(self) -> dict[str, float | str | bool]:
         """The values in use, by the names of `IN_FORCE`."""
@@ -165,18 +179,11 @@ class DriverSession:
 
     def _kept(self) -> KeeperLink | None:
         """The keeper of the device, if its back end has one and it is not switched off."""
-        settings = self.settings
-        if not (BACK_ENDS[settings.stage].has_keeper and settings.keeper_timeout):
+        s, period = self.settings, self.stage.sample_period
+        if not (BACK_ENDS[s.stage].has_keeper and s.keeper_timeout):
             return None
-        period = self.stage.sample_period
         return KeeperLink(
-            settings.stage,
-            self._values,
-            period,
-            self.limits,
-            settings.ramp_rate,
-            settings.keeper_timeout,
-            self._longest_step(),
+            s.stage, self._values, period, self.limits, s.ramp_rate, s.keeper_timeout, self._longest_step()
         )
 
     def _longest_step(self) -> float:
