@@ -144,6 +144,8 @@ class Tally:
     ----------
     samples, blocks, never_measured : int
         Numbers of delivered samples, of blocks, and of samples that were not measured.
+    undated : int
+        Number of blocks whose time is too late for a message, so that their stamp stands still.
     latest : float
         Largest delay of a block [s].
     postponed, clock_jumps, clock_drift : float
@@ -154,6 +156,7 @@ class Tally:
     samples: int = 0
     blocks: int = 0
     never_measured: int = 0
+    undated: int = 0
     latest: float = 0.0
     postponed: float = 0.0
     clock_jumps: float = 0.0
