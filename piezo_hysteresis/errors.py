@@ -24,7 +24,8 @@
     ├── DivergenceError       (ArithmeticError)  a simulation that diverged
     ├── StageError            (OSError)          a stage or its limits, link, state
     │   ├── DeviceError                          the device itself failed
-    │   └── StoppedError                         work on a device was interrupted by a stop
+    │   ├── StoppedError                         work on a device was interrupted by a stop
+    │   └── UnknownVoltageError                  nothing reports the voltage at which a device stands
     ├── RecordingError        (OSError)          a file that cannot be read or written
     └── MissingPackageError   (ImportError)      a Python package of an extra is not installed
 
@@ -88,6 +89,10 @@ class DeviceError(StageError):
 
 class StoppedError(StageError):
     """Work on a device was interrupted by a stop; nothing was started afterwards."""
+
+
+class UnknownVoltageError(StageError):
+    """Nothing reports the voltage at which a device stands, so that no ramp can begin there."""
 
 
 class RecordingError(PiezoError, OSError):

@@ -31,6 +31,7 @@ from piezo_hysteresis.errors import (
     RecordingError,
     StageError,
     StoppedError,
+    UnknownVoltageError,
     printable,
     reason_of,
 )
@@ -59,7 +60,8 @@ def test_every_error_is_one_printable_line(kind):
     [
         DivergenceError("arx", 10694, 0.21388),
         MissingPackageError("fleet", "dask", "fleet"),
-        *(kind("said") for kind in (PiezoError, IdentificationError, StageError, DeviceError, StoppedError)),
+        *(kind("said") for kind in (PiezoError, IdentificationError, StageError, DeviceError)),
+        *(kind("said") for kind in (StoppedError, UnknownVoltageError)),
     ],
     ids=lambda error: type(error).__name__,
 )

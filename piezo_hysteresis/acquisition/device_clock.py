@@ -17,7 +17,9 @@
 from __future__ import annotations
 
 import math
+import time
 
+from .sample_block import Tally
 from .time_base import TimeBase
 
 _WINDOW = 100
@@ -57,3 +59,11 @@ class DeviceClock:
         if abs(difference) <= self._time_base.tolerance:
             return 0.0
         return self._time_base.postpone(end, self._time_base.due(end) + difference)
+
+    def follow_block(self, first: int, count: int, tally: Tally) -> None:
+        """Follow the device after it has returned `count` samples that begin at index `first`; they are counted."""
+        end, now = first + count, time.monotonic()
+        if first == 0:  # the time for opening the stream is unknown
+            self._time_base.postpone(end, now)
+        tally.latest = max(tally.latest, now - self._time_base.due(end))
+        tally.clock_drift += self.follow(end, now)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`Drive`: the next samples to apply, and the phases that begin or end among them. No ROS."""
+"""`Drive`: the next samples to apply, and the phases that begin or end among them; `OpenCommands`. No ROS."""
 
 from __future__ import annotations
 
@@ -63,11 +63,12 @@ class EventKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Before sample `offset` of the block, a phase began, was completed, or was stopped."""
+    """Before sample `offset` of a block, a phase began, was completed, or was stopped (by a fault: `reason`)."""
 
     offset: int
     kind: EventKind
     phase: Phase
+    reason: str = ""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -87,3 +88,25 @@ class Drive:
     voltage: Samples
     phase: NDArray[np.uint32]
     events: tuple[Event, ...]
+
+
+class OpenCommands:
+    """The commands that were accepted, and whose end was not reported yet."""
+
+    def __init__(self) -> None:
+        self._phases: dict[int, Phase] = {}
+
+    def add(self, phase: Phase) -> None:
+        """A command was accepted."""
+        self._phases[phase.number] = phase
+
+    def follow(self, events: tuple[Event, ...]) -> None:
+        """These events are reported now."""
+        for event in events:
+            if event.kind is not EventKind.BEGAN:
+                self._phases.pop(event.phase.number, None)
+
+    def stop(self, reason: str) -> tuple[Event, ...]:
+        """The ends of all of them, because no sample follows any more; to be reported now."""
+        phases, self._phases = self._phases, {}
+        return tuple(Event(0, EventKind.STOPPED, phase, reason) for phase in phases.values())

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..stage.stage import Samples
+from ..stage.stage import Acquired, Samples
 from .drive import Event
 
 
@@ -60,6 +60,29 @@ class SampleBlock:
     frame: str = ""
     follows_gap: bool = False
 
+    @classmethod
+    def acquired(
+        cls,
+        acquired: Acquired,
+        phase: NDArray[np.uint32],
+        stamp: int,
+        sample_period: float,
+        first: int,
+        *,
+        follows_gap: bool = False,
+    ) -> SampleBlock:
+        """The block of what a stage has returned: `first` is the index of its first sample, taken at `stamp` [ns]."""
+        count = acquired.voltage.size
+        return cls(
+            stamp=stamp,
+            time=np.arange(count) * np.float64(sample_period),
+            voltage=acquired.voltage,
+            displacement=acquired.displacement,
+            index=np.arange(first, first + count).astype(np.uint32),  # modulo 2^32
+            phase=phase,
+            follows_gap=follows_gap,
+        )
+
     @property
     def size(self) -> int:
         """Number of samples."""
@@ -95,7 +118,7 @@ class Delivery:
     Parameters
     ----------
     block : SampleBlock
-        The samples.
+        The samples; none if the acquisition ends with these events.
     first : int
         Index of the first sample, not wrapped at 2^32.
     events : tuple of Event
@@ -106,6 +129,12 @@ class Delivery:
     first: int
     events: tuple[Event, ...]
 
+    @classmethod
+    def without_samples(cls, first: int, events: tuple[Event, ...]) -> Delivery:
+        """Events after the last sample, which has index `first` - 1."""
+        none, no_number = np.empty(0), np.empty(0, np.uint32)
+        return cls(SampleBlock(0, none, none, none, no_number, no_number), first, events)
+
 
 @dataclass(slots=True)
 class Tally:
@@ -115,6 +144,8 @@ class Tally:
     ----------
     samples, blocks, never_measured : int
         Numbers of delivered samples, of blocks, and of samples that were not measured.
+    undated : int
+        Number of blocks whose time is too late for a message, so that their stamp stands still.
     latest : float
         Largest delay of a block [s].
     postponed, clock_jumps, clock_drift : float
@@ -125,6 +156,7 @@ class Tally:
     samples: int = 0
     blocks: int = 0
     never_measured: int = 0
+    undated: int = 0
     latest: float = 0.0
     postponed: float = 0.0
     clock_jumps: float = 0.0

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..errors import PiezoError, StageError
@@ -40,6 +41,10 @@ from .time_base import TimeBase
 
 _KEEPER_TIME = 10.0
 """Longest wait for the keeper of a stage that this driver could not make safe, in addition to two ramps [s]."""
+
+
+_STREAMING: set[DriverSession] = set()
+"""Sessions that use their stage. Lock and stage are kept also if nobody refers to a session whose stage hangs."""
 
 
 class DriverSession:
@@ -77,7 +82,10 @@ class DriverSession:
         self._lock = StageLock([place])
         self._keeper: KeeperLink | None = None
         self._acquisition: StreamingAcquisition | None = None
-        opening = Opening(settings.sample_period, settings.real_time_factor, **({"read": read} if read else {}))
+        self._is_stuck = False
+        opening = Opening(settings.sample_period, settings.real_time_factor)
+        if read is not None:
+            opening = replace(opening, read=read)
         try:
             self.stage = open_stage(settings.stage, values, opening, self._lock_device)
         except BaseException:
@@ -107,7 +115,21 @@ class DriverSession:
         fail: Callable[[PiezoError], None],
         subscribers: Callable[[], int],
     ) -> StreamingAcquisition:
-        """Begin to stream at the present voltage; see `StreamingAcquisition` for the parameters."""
+        """Begin to stream at the present voltage; see `StreamingAcquisition` for the parameters.
+
+        Raises
+        ------
+        StageError
+            If the acquisition that was started before still uses the stage, or a stage that was left outside the limits
+            cannot be brought to its safe voltage.
+        """
+        if self._acquisition is not None and self._acquisition.is_running:
+            raise StageError(
+                f"{self.limits.name}: the acquisition that was started before still uses the stage; stop it first, or "
+                "end this program if a call of the stage does not return"
+            )
+        if self._is_outside:
+            self.stage.safe()  # no waveform may begin there
         settings = self.settings
         wanted = self._values.get("subscribers", 0)
         arguments = (
@@ -126,6 +148,7 @@ class DriverSession:
             acquisition = StreamingAcquisition(*arguments)
         else:
             acquisition = MemoryAcquisition(*arguments, rest_period=1 / settings.live_rate)
+        _STREAMING.add(self)
         acquisition.start()
         self._acquisition = acquisition
         return acquisition
@@ -133,21 +156,22 @@ class DriverSession:
     @property
     def notices(self) -> tuple[str, ...]:
         """Sentences about the stage that a user should read before it moves."""
-        return self.stage.notices if isinstance(self.stage, ReplayStage) else ()
+        if isinstance(self.stage, ReplayStage):
+            return self.stage.notices
+        low, high, safe = self.limits.voltage_min, self.limits.voltage_max, self.limits.safe_voltage
+        ramp = f"found at {self.stage.voltage:g} V, outside {low:g} to {high:g} V; the start ramps it to {safe:g} V"
+        return (f"{self.limits.name}: {ramp}, the safe voltage",) if self._is_outside else ()
+
+    @property
+    def _is_outside(self) -> bool:
+        """Whether a stream could not begin at the voltage at which another program has left the stage."""
+        limits = self.limits
+        streams = limits.streaming and not limits.ignores_drive
+        return streams and not limits.voltage_min <= self.stage.voltage <= limits.voltage_max
 
     def in_force(self) -> dict[str, float | str | bool]:
         """The values in use, by the names of `IN_FORCE`."""
-        limits, settings = self.limits, self.settings
-        return {
-            "stage": limits.name,
-            "sample_period": self.sample_period,
-            "voltage_min": limits.voltage_min,
-            "voltage_max": limits.voltage_max,
-            "safe_voltage": limits.safe_voltage,
-            "max_slew_rate": limits.max_slew_rate,
-            "ramp_rate": settings.ramp_rate,
-            "stopped": self.latch.is_set,
-        }
+        return self.settings.in_force(self.limits, self.sample_period) | {"stopped": self.latch.is_set}
 
     def _lock_device(self, found: Description) -> None:
         if BACK_ENDS[self.settings.stage].is_device:
@@ -155,18 +179,11 @@ class DriverSession:
 
     def _kept(self) -> KeeperLink | None:
         """The keeper of the device, if its back end has one and it is not switched off."""
-        settings = self.settings
-        if not (BACK_ENDS[settings.stage].has_keeper and settings.keeper_timeout):
+        s, period = self.settings, self.stage.sample_period
+        if not (BACK_ENDS[s.stage].has_keeper and s.keeper_timeout):
             return None
-        period = self.stage.sample_period
         return KeeperLink(
-            settings.stage,
-            self._values,
-            period,
-            self.limits,
-            settings.ramp_rate,
-            settings.keeper_timeout,
-            self._longest_step(),
+            s.stage, self._values, period, self.limits, s.ramp_rate, s.keeper_timeout, self._longest_step()
         )
 
     def _longest_step(self) -> float:
@@ -194,9 +211,10 @@ class DriverSession:
         """
         if self._acquisition is None:
             return
-        timeout = self._longest_step()
+        timeout = 0.0 if self._is_stuck else self._longest_step()
         reached = self._acquisition.make_safe(timeout)
-        if self._acquisition.is_running:
+        self._is_stuck = self._acquisition.is_running
+        if self._is_stuck:
             if self._keeper is not None:
                 self._keeper.abandon()
             raise StageError(
@@ -205,6 +223,7 @@ class DriverSession:
                 "program, and switch the amplifier off by hand"
             )
         self._acquisition = None
+        _STREAMING.discard(self)
         self.stage.safe()  # ends the stream of a device
         if not reached:
             raise StageError(

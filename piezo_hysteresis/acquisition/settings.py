@@ -188,3 +188,15 @@ class DriverSettings:
         """Duration of the longest ramp to the safe voltage [s]."""
         largest = max(limits.voltage_max - limits.safe_voltage, limits.safe_voltage - limits.voltage_min)
         return math.ceil(largest / self.ramp_rate / self.real_time_factor)
+
+    def in_force(self, limits: Description, sample_period: float) -> dict[str, float | str | bool]:
+        """The values in use with these limits and this sample period [s], by the names of `IN_FORCE`."""
+        return {
+            "stage": limits.name,
+            "sample_period": sample_period,
+            "voltage_min": limits.voltage_min,
+            "voltage_max": limits.voltage_max,
+            "safe_voltage": limits.safe_voltage,
+            "max_slew_rate": limits.max_slew_rate,
+            "ramp_rate": self.ramp_rate,
+        }

@@ -21,19 +21,17 @@ import time
 from collections.abc import Callable
 from typing import cast
 
-import numpy as np
-
 from ..errors import PiezoError, StageError
 from ..stage.stage import Acquired, Samples, Stage, StreamingStage
 from .device_clock import DeviceClock
-from .drive import Drive, Phase
+from .drive import Drive, OpenCommands, Phase
 from .latency_buffer import LatencyBuffer
 from .playback import Playback
 from .recorded_playback import RecordedPlayback
 from .safety.keeper_link import KeeperLink, NoKeeper
 from .safety.stop_latch import StopLatch
 from .sample_block import Delivery, SampleBlock, Tally
-from .time_base import TimeBase, read_together
+from .time_base import LATEST_STAMP, TimeBase, read_together
 
 Source = Playback | RecordedPlayback
 
@@ -89,6 +87,7 @@ class StreamingAcquisition:
         self._device_clock = DeviceClock(time_base) if stage.description.latency else None
         self._latch = StopLatch() if latch is None else latch
         self._keeper = NoKeeper() if keeper is None else keeper
+        self._open, self._is_abandoned = OpenCommands(), False
         self._access = threading.Lock()
         self._ending, self._halting = threading.Event(), threading.Event()
         self._safe = threading.Event()
@@ -122,6 +121,7 @@ class StreamingAcquisition:
             self._require_free(name)
             check(waveform, self.playback.voltage)
             phase = self.playback.play(waveform, name, stamp)
+            self._open.add(phase)
             accepted(phase, waveform.size)
             return phase
 
@@ -165,6 +165,9 @@ class StreamingAcquisition:
         reached = self._safe.is_set()
         self._halting.set()
         self._thread.join(timeout)
+        if self.is_running and not self._is_abandoned:
+            self._is_abandoned = True  # its last samples come too late for everybody
+            self._end_commands("a call of the stage does not return")
         return reached
 
     @property
@@ -191,7 +194,9 @@ class StreamingAcquisition:
             if not self._safe.is_set():  # `make_safe` has given up, because a call of the stage took too long
                 self._go_safe()
         except Exception as error:  # after any exception the stage must not keep its voltage
-            self._fail(self._abandon(error))
+            failure = self._abandon(error)
+            self._fail(failure)
+            self._end_commands(str(failure))
             self._safe.set()
         finally:
             self._keeper.end_step()
@@ -209,6 +214,13 @@ class StreamingAcquisition:
             return StageError(f"{error}; the stage could not be brought to its safe voltage: {unsafe}")
         return error if isinstance(error, PiezoError) else StageError(f"fault of the driver: {error!r}")
 
+    def _end_commands(self, reason: str) -> None:
+        """Deliver the end of the commands of which no further sample will be measured."""
+        with self._access:
+            events = self._open.stop(reason)
+        if events:
+            self._deliver(Delivery.without_samples(self.index, events))
+
     def _step(self) -> None:
         if self._device_clock is None and not self._keep_pace():
             return
@@ -216,7 +228,7 @@ class StreamingAcquisition:
             drive = self.playback.take(self.block_size)
         acquired = cast(StreamingStage, self.stage).exchange(drive.voltage)
         if self._device_clock is not None:
-            self._follow(self._device_clock)
+            self._device_clock.follow_block(self.index, self.block_size, self.tally)
         self._pass_on(self.index, self._late.follow(drive), acquired)
 
     def _keep_pace(self) -> bool:
@@ -230,14 +242,6 @@ class StreamingAcquisition:
             self.tally.postponed += self._time_base.postpone(self.index + self.block_size, now)
         return True
 
-    def _follow(self, clock: DeviceClock) -> None:
-        """Adjust the time base to the clock of the device."""
-        end, now = self.index + self.block_size, time.monotonic()
-        if self.index == 0:  # the time for opening the stream is unknown
-            self._time_base.postpone(end, now)
-        self.tally.latest = max(self.tally.latest, now - self._time_base.due(end))
-        self.tally.clock_drift += clock.follow(end, now)
-
     def _wait_until(self, steady: float) -> bool:
         """Wait until a time on the steady clock [s]; returns False if the thread has to end before."""
         self._keeper.begin_step()
@@ -246,16 +250,11 @@ class StreamingAcquisition:
     def _pass_on(self, first: int, drive: Drive, acquired: Acquired) -> None:
         """Deliver samples that begin at index `first`; the samples before them were not measured."""
         self.tally.clock_jumps += abs(self._time_base.follow(first, *read_together(self._node_clock)))
-        count = acquired.voltage.size
-        block = SampleBlock(
-            stamp=self._time_base.stamp(first),
-            time=np.arange(count) * np.float64(self._time_base.sample_period),
-            voltage=acquired.voltage,
-            displacement=acquired.displacement,
-            index=np.arange(first, first + count).astype(np.uint32),  # modulo 2^32
-            phase=drive.phase,
-            follows_gap=first > self.index,
-        )
-        self.tally.count(count, first - self.index)
-        self.index = first + count
-        self._deliver(Delivery(block, first, drive.events))
+        stamp, period = self._time_base.stamp(first), self._time_base.sample_period
+        block = SampleBlock.acquired(acquired, drive.phase, stamp, period, first, follows_gap=first > self.index)
+        self.tally.undated += stamp == LATEST_STAMP
+        self.tally.count(block.size, first - self.index)
+        self.index = first + block.size
+        self._open.follow(drive.events)
+        if not self._is_abandoned:
+            self._deliver(Delivery(block, first, drive.events))

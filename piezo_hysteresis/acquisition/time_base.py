@@ -21,6 +21,9 @@ from collections.abc import Callable
 
 _NANO = 1_000_000_000
 """Nanoseconds in a second."""
+LATEST_STAMP = (2**31 - 3600) * _NANO
+"""Latest stamp [ns]. A ROS message holds dates before 2038-01-19, 03:14:08 UTC (seconds in 32 bits); the last hour is
+left for the times within a block."""
 _TOGETHER = 2e-5
 """Two readings within this time count as simultaneous [s]."""
 _ATTEMPTS = 8
@@ -81,8 +84,11 @@ class TimeBase:
         return self._index + -int((self._steady - steady) // self._real_period)
 
     def stamp(self, index: int) -> int:
-        """Stamp of a sample [ns]; at least 0, also shortly after the start of a simulated clock."""
-        return max(0, self._stamp_at(index))
+        """Stamp of a sample [ns]; at least 0, also shortly after the start of a simulated clock.
+
+        It stands still at `LATEST_STAMP`; the index continues to count the samples.
+        """
+        return min(max(0, self._stamp_at(index)), LATEST_STAMP)
 
     def follow(self, index: int, steady: float, node: int) -> float:
         """Renew the anchor at `index` if the node's clock has jumped against the steady clock.

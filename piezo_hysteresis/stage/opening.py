@@ -42,11 +42,15 @@ class Opening:
         Simulated or replayed seconds per second; 1 for every device.
     read : callable
         Reads the records of a recording from its path. (Stages do not import the readers of recordings.)
+    assumes_voltage : bool
+        Whether a stage may assume its voltage where the values allow this; otherwise it is read, or the stage refuses
+        to open with an UnknownVoltageError. A keeper assumes nothing.
     """
 
     sample_period: float = 0.0
     real_time_factor: float = 1.0
     read: Callable[[str], Iterable[Record]] = _no_reader
+    assumes_voltage: bool = True
 
 
 @dataclass(frozen=True, slots=True)

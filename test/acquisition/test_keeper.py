@@ -33,6 +33,8 @@ from piezo_hysteresis.stage.opening import Opening
 pytestmark = pytest.mark.device
 
 TIMEOUT = 0.5
+BLIND = {"voltage_input": "", "assume_safe": True}
+"""Of a card that does not report its output, and whose user has said that it is at the safe voltage at the start."""
 
 
 def wait(condition, what, folder, timeout=60.0):
@@ -44,10 +46,10 @@ def wait(condition, what, folder, timeout=60.0):
 
 
 @contextmanager
-def driver_in_motion(folder, word, moved_to=3.0):
+def driver_in_motion(folder, word, moved_to=3.0, blind=False):
     """The process of a driver whose stage has passed a voltage [V], and the amplifier; killed at the end."""
-    with device(word) as (name, parameters, amplifier, _):
-        process = driver_process(folder, name, parameters, TIMEOUT)
+    with device(word, **({"reads_back": False} if blind else {})) as (name, parameters, amplifier, _):
+        process = driver_process(folder, name, parameters | (BLIND if blind else {}), TIMEOUT)
         try:
             wait(lambda: amplifier.output > moved_to, "motion", folder)
             yield process, amplifier
@@ -108,10 +110,23 @@ def test_a_driver_whose_keeper_is_killed_ends_safe(tmp_path):
         check_wire(amplifier.wire)
 
 
+def test_a_driver_that_goes_on_where_its_keeper_cannot_act_makes_the_stage_safe_itself(tmp_path):
+    """A keeper that does not know the voltage does not end the only process that does."""
+    pytest.importorskip("nidaqmx")
+    with driver_in_motion(tmp_path, "nidaqmx", blind=True) as (process, amplifier):
+        process.send_signal(signal.SIGSTOP)
+        wait(lambda: "switch the amplifier off by hand" in (tmp_path / "log").read_text(), "the keeper", tmp_path)
+        process.send_signal(signal.SIGCONT)
+        assert process.wait(30.0) not in (0, -signal.SIGKILL)
+        assert abs(amplifier.output) <= SAFE_WITHIN
+        check_wire(amplifier.wire)
+
+
 @contextmanager
-def keeper_of_a_held_voltage():
+def keeper_of_a_held_voltage(kind="gcs2", blind=False):
     """A keeper that is ready, and the amplifier of its stage, whose driver has left it at 3 V."""
-    with device("gcs2") as (word, parameters, amplifier, _):
+    with device(kind, **({"reads_back": False} if blind else {})) as (word, parameters, amplifier, _):
+        parameters |= BLIND if blind else {}
         stage = BACK_ENDS[word].open(parameters, Opening(PERIOD))
         stage.set_voltage(3.0)
         limits = {"voltage_min": 0.0, "voltage_max": TOP, "max_slew_rate": SLEW}
@@ -138,6 +153,16 @@ def test_a_keeper_acts_also_when_nobody_reads_its_messages_any_more():
         keeper.stdin.close()
         keeper.wait(30.0)
         assert abs(amplifier.output) <= SAFE_WITHIN
+
+
+def test_a_keeper_never_assumes_where_a_stage_stands():
+    pytest.importorskip("nidaqmx")
+    with keeper_of_a_held_voltage("nidaqmx", blind=True) as (keeper, amplifier):
+        _, said = keeper.communicate(timeout=30.0)
+        assert keeper.returncode == 1
+        assert b"the voltage of the stage is unknown; switch the amplifier off by hand" in said
+        assert b"is at its safe voltage" not in said
+        assert amplifier.output == pytest.approx(3.0, abs=SAFE_WITHIN)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)

@@ -24,7 +24,7 @@ from benchmarks.wire import LSB, SAFE_WITHIN, WiredSession, check_wire, device, 
 from piezo_hysteresis.acquisition.session import DriverSession
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.record import Record
-from piezo_hysteresis.stage.daqmx.tasks import DaqmxError
+from piezo_hysteresis.stage.daqmx.daqmx_error import DaqmxError
 from piezo_hysteresis.stage.gcs2.connection import Gcs2Error
 
 pytestmark = pytest.mark.device
@@ -131,6 +131,10 @@ def test_a_call_that_does_not_return_is_left_to_the_keeper(kept, monkeypatch):
         with pytest.raises(StageError, match=f"does not return; its voltage is unknown, .*{expected}"):
             s.session.close()
         assert callers == []
+        with pytest.raises(StageError, match="still uses the stage"):
+            s.session.start(time.time_ns, s.deliveries.append, s.failures.append, lambda: 1)
+        with pytest.raises(StageError, match="is held by process"):
+            WiredSession(name, parameters, amplifier)
         if kept:
             s.wait(lambda: abs(s.output) <= SAFE_WITHIN, "the keeper")
         released.set()

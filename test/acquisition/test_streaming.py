@@ -25,7 +25,7 @@ from piezo_hysteresis.acquisition.drive import EventKind
 from piezo_hysteresis.acquisition.memory import MemoryAcquisition
 from piezo_hysteresis.acquisition.playback import Playback
 from piezo_hysteresis.acquisition.streaming import StreamingAcquisition
-from piezo_hysteresis.acquisition.time_base import TimeBase
+from piezo_hysteresis.acquisition.time_base import LATEST_STAMP, TimeBase
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.stage.simulated import SimulatedMemoryStage
 
@@ -62,12 +62,10 @@ class Listener:
         return [e.phase.name for d in self.deliveries for e in d.events if e.kind is kind]
 
 
-def started(stage, kind=StreamingAcquisition, rate=10.0, **named):
+def started(stage, kind=StreamingAcquisition, rate=10.0, clock=time.time_ns, **named):
     listener = Listener()
     playback = Playback(stage.voltage, 0.0, PERIOD, RAMP_RATE)
-    acquisition = kind(
-        stage, playback, TimeBase(PERIOD, rate), 100, time.time_ns, listener.deliver, listener.fail, **named
-    )
+    acquisition = kind(stage, playback, TimeBase(PERIOD, rate), 100, clock, listener.deliver, listener.fail, **named)
     acquisition.start()
     listener.wait(lambda heard: heard.deliveries or heard.failures)
     return acquisition, listener
@@ -174,6 +172,34 @@ def test_a_device_with_its_own_clock_sets_the_rate_and_the_stamps():
     assert np.array_equal(listener.joined("index"), np.arange(100 * len(listener.deliveries)))
     assert acquisition.tally.clock_drift < 0.0
     assert acquisition.make_safe(30.0)
+
+
+@pytest.mark.parametrize("buffered", [False, True])
+def test_a_waveform_that_a_fault_ends_is_reported_as_stopped_with_the_reason(buffered):
+    """Also one that was put out completely, if its last samples were still in the buffer of the device."""
+    stage = OwnClock(1.0, lead=0.4) if buffered else Witness(PERIOD, RAMP_RATE)
+    acquisition, listener = started(stage, rate=1.0)
+    play(acquisition, np.zeros(100), "first")
+    listener.wait(lambda heard: "first" in heard.events(EventKind.DONE))
+    play(acquisition, np.zeros(100 if buffered else 100_000), "second")
+    if buffered:
+        listener.wait(lambda heard: not acquisition.playback.is_playing)
+    stage._fails_at = stage._calls + 2
+    listener.wait(lambda heard: heard.failures)
+    assert acquisition.make_safe(30.0)
+    assert listener.events(EventKind.DONE) == ["first"]
+    assert listener.events(EventKind.STOPPED) == ["second"]
+    assert listener.deliveries[-1].events[-1].reason == "witness: link lost"
+    assert np.array_equal(listener.joined("index"), np.arange(acquisition.index)), "no sample is made up"
+
+
+def test_the_stream_goes_on_after_the_last_date_of_a_message():
+    acquisition, listener = started(Witness(PERIOD, RAMP_RATE), clock=lambda: 2**31 * 10**9 + time.time_ns())
+    listener.wait(lambda heard: heard.failures or len(heard.deliveries) > 3)
+    assert acquisition.make_safe(30.0)
+    assert not listener.failures
+    assert {d.block.stamp for d in listener.deliveries} == {LATEST_STAMP}
+    assert acquisition.tally.undated == len(listener.deliveries)
 
 
 def test_after_a_long_stall_stamps_move_and_samples_do_not():

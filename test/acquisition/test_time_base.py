@@ -20,7 +20,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.acquisition.time_base import TimeBase, read_together
+from piezo_hysteresis.acquisition.time_base import LATEST_STAMP, TimeBase, read_together
 
 START = 1_700_000_000_000_000_000
 
@@ -57,6 +57,15 @@ def test_a_jump_of_the_clock_resets_the_time_base_once(jump):
     assert time.stamp(600) == START + 500 * 20_000 + moved
     assert time.follow(1100, 50.02, START + 20_000_000 + moved) == 0.0
     assert time.due(1100) == pytest.approx(50.02)
+
+
+def test_stamps_stand_still_at_the_latest_date_of_a_message_and_go_on_when_the_clock_is_set_right():
+    time = base()
+    ahead = LATEST_STAMP - START + 10**9
+    time.follow(600, 50.01, START + 10_000_000 + ahead)
+    assert time.stamp(600) == time.stamp(10**9) == LATEST_STAMP
+    assert time.follow(1100, 50.02, START + 20_000_000) == pytest.approx(-ahead * 1e-9)
+    assert time.stamp(1100) == START + 20_000_000
 
 
 def test_an_interrupted_reading_is_not_a_jump():

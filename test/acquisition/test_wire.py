@@ -14,6 +14,7 @@
 
 """The limiter stands last on every path: each device puts out nothing outside range, slew and ramp rate."""
 
+import re
 import time
 from dataclasses import replace
 
@@ -244,6 +245,31 @@ def test_the_next_start_at_a_voltage_that_a_killed_driver_has_left(word):
         wire = np.concatenate([np.full(1, TOP), *amplifier.parts[since:]])
         check_wire(wire, begins=TOP)
         assert np.flatnonzero(wire > 0.05)[-1] - np.flatnonzero(wire > 0.95 * TOP)[-1] > 0.85 * TOP / (RAMP * PERIOD)
+        s.end()
+
+
+@pytest.mark.parametrize("word", ["gcs2", "nidaqmx"])
+def test_a_stage_that_was_left_outside_the_limits_of_the_driver_is_first_made_safe(word):
+    left = TOP + 2.0
+    with device(word) as (name, parameters, amplifier, (emulated, _)):
+        if word == "gcs2":
+            emulated.carry_out(f"SVA 1 {left * GAIN}")
+        else:
+            emulated.set(left)
+        since = len(amplifier.parts)
+        s = WiredSession(name, parameters, amplifier, voltage_max=TOP)
+        assert np.ptp(np.concatenate([np.full(1, left), *amplifier.parts[since:]])) <= LSB, "opening moves nothing"
+        if word == "nidaqmx":
+            (notice,) = s.session.notices
+            assert re.search(r"found at (8|7\.99\d*) V, outside 0 to 6 V; the start ramps it to 0 V", notice)
+        s.start()
+        s.wait(lambda: abs(s.output) <= SAFE_WITHIN, "the safe voltage")
+        check_wire(np.concatenate([np.full(1, left), *amplifier.parts[since:]]), begins=left)
+        assert s.session.notices == ()
+        s.wait(lambda: not s.acquisition.playback.is_stopping, "the end of the way to the safe voltage")
+        s.acquisition.ramp_to(1.0)
+        s.wait(lambda: abs(s.output - 1.0) <= SAFE_WITHIN, "the first set-point")
+        assert not s.failures
         s.end()
 
 

@@ -16,7 +16,8 @@
 
 The driver starts it (`KeeperLink`). The driver sends a line of JSON on standard input, which states how to open the
 stage, and then a byte at regular intervals (the heartbeat). The keeper opens the stage over its own connection, without
-moving it, answers ``ready``, and does nothing while bytes arrive.
+moving it, answers ``ready``, and does nothing while bytes arrive. If nothing reports the voltage of the stage, the
+keeper moves nothing when it has to act, and asks for the amplifier to be switched off.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from ...errors import PiezoError, reason_of
+from ...errors import PiezoError, UnknownVoltageError, reason_of
 from ...stage.back_ends import BACK_ENDS
 from ...stage.opening import Opening
 from ...stage.stage import Stage
@@ -51,6 +52,8 @@ ATTEMPTS = 5
 """Number of attempts to bring the stage to its safe voltage."""
 _BETWEEN_ATTEMPTS = 0.2
 """Time between two attempts [s]."""
+_UNKNOWN = "the voltage of the stage is unknown; switch the amplifier off by hand: the device may hold its output"
+"""End of the report of a keeper that has not made its stage safe."""
 
 
 def main() -> int:
@@ -61,8 +64,11 @@ def main() -> int:
     if not line:
         return 0  # the driver ended before it named the stage
     order = json.loads(line)
+    stage: Stage | None = None
     try:
         stage = _opened(order)
+    except UnknownVoltageError:
+        _report("neither the device nor a monitor reports the voltage; without the driver the stage keeps its voltage")
     except PiezoError as error:
         print(f"{' '.join(str(error).split())}", flush=True)  # noqa: T201  # the answer to the driver
         return 1
@@ -75,6 +81,9 @@ def main() -> int:
         os._exit(0)  # closing the stage would move it
     with suppress(BrokenPipeError):
         print(ACTING, flush=True)  # noqa: T201  # a driver that continues after a silence must not use the stage
+    if stage is None:
+        _report(f"{reason}; {_UNKNOWN}")
+        return 1
     _report(f"{reason}; bringing {stage.description.name} to its safe voltage")
     if order["ends_driver"] and reason != _HANDED_OVER:
         with suppress(OSError):  # the driver has ended, and its number may belong to another process
@@ -83,7 +92,7 @@ def main() -> int:
 
 
 def _opened(order: Mapping[str, Any]) -> Stage:
-    stage = BACK_ENDS[order["stage"]].open(order["values"], Opening(order["sample_period"]))
+    stage = BACK_ENDS[order["stage"]].open(order["values"], Opening(order["sample_period"], assumes_voltage=False))
     stage.restrict(replace(stage.description, **order["limits"]), order["ramp_rate"])
     return stage
 
@@ -116,6 +125,7 @@ def _make_safe(stage: Stage, order: Mapping[str, Any]) -> int:
         else:
             _report(f"{stage.description.name} is at its safe voltage")
             return 0
+    _report(f"{stage.description.name} could not be brought to its safe voltage; {_UNKNOWN}")
     return 1
 
 

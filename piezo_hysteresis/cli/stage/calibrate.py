@@ -32,6 +32,7 @@ from ...stage.daqmx.setup import DaqmxSetup
 from ...stage.daqmx.stage import DaqmxStage
 from ..options.destination import add_force, require_new_results
 from ..terminal import console
+from .safe_session import closed_safely
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -91,17 +92,10 @@ def run(args: argparse.Namespace) -> int:
         sensor_gain=1.0,
         max_slew_rate=20.0 / args.sample_period,  # nothing is connected that a step could harm
     )
-    stage = DaqmxStage(setup)
     try:
-        lock = StageLock([f"device {stage.description.name}"])
-    except StageError:
-        stage.leave()
-        raise
-    try:
-        delay = loop_back_delay(stage, args.amplitude)
-    finally:
-        stage.close()
-        lock.release()
+        delay = _measured(setup, args.amplitude)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"{args.device} is at {setup.safe_voltage:g} V; nothing was written") from None
     wired = f"{args.device}, {args.wired_output} to {args.wired_input}"
     text = (
         f"# Delay of {wired}, at {args.sample_period:g} s per sample, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC\n"
@@ -115,3 +109,18 @@ def run(args: argparse.Namespace) -> int:
         f"{wired}: {1e6 * delay:.2f} µs, {delay / args.sample_period:.2f} samples; written to {args.output}"
     )
     return 0
+
+
+def _measured(setup: DaqmxSetup, amplitude: float) -> float:
+    """The delay of a card [s], locked while it is used; the output is brought to its safe voltage at the end."""
+    lock = StageLock([])
+    try:
+        with closed_safely(lambda: DaqmxStage(setup)) as stage:
+            try:
+                lock.add(f"device {stage.description.name}")
+            except StageError:
+                stage.leave()
+                raise
+            return loop_back_delay(stage, amplitude)
+    finally:
+        lock.release()

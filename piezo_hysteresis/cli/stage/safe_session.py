@@ -17,10 +17,10 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from ...acquisition.session import DriverSession
 from ...acquisition.settings import DriverSettings
@@ -29,30 +29,53 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Signals that end a command; SIGHUP is sent when the terminal is closed."""
 
 
+class Closable(Protocol):
+    """A stage or a session on one."""
+
+    def close(self) -> None:
+        """Go to the safe voltage and release the device."""
+
+
+_Opened = TypeVar("_Opened", bound=Closable)
+
+
 @contextmanager
 def safe_session(settings: DriverSettings, values: Mapping[str, Any], place: str) -> Iterator[DriverSession]:
-    """Open a session for the block, and bring its stage to the safe voltage at the end.
-
-    The first of `_SIGNALS` raises KeyboardInterrupt in the block. After it, and while the session closes, all of them
-    are ignored, because they would interrupt the ramp to the safe voltage.
+    """Open a session for the block, and bring its stage to the safe voltage at the end, as `closed_safely` does.
 
     Parameters
     ----------
     settings, values, place
         As for `DriverSession`.
     """
+    with closed_safely(lambda: DriverSession(settings, values, place)) as session:
+        yield session
+
+
+@contextmanager
+def closed_safely(opening: Callable[[], _Opened]) -> Iterator[_Opened]:
+    """Open a stage for the block, and close it at the end, whatever signals arrive.
+
+    The first of `_SIGNALS` raises KeyboardInterrupt in the block. After it, and while the stage closes, all of them
+    are ignored, because they would interrupt the ramp to the safe voltage.
+
+    Parameters
+    ----------
+    opening : callable
+        Opens the stage, or a session on it.
+    """
     with _handlers_kept() as before:
         for number, handler in before.items():
             if handler is not signal.SIG_IGN:
                 signal.signal(number, _interrupt)
-        session = DriverSession(settings, values, place)
+        opened = opening()
         try:
-            yield session
+            yield opened
         finally:
             try:
                 _ignore()
             finally:  # also where a signal has arrived just then
-                session.close()
+                opened.close()
 
 
 @contextmanager

@@ -169,6 +169,8 @@ class Calls:
 
     def WaitUntilTaskDone(self, request: Any) -> dict[str, Any]:
         self._wait(lambda: self._card.left, request.time_to_wait, _NOT_DONE)
+        if not self._task(request).is_finite:
+            self.underflow()  # only so does a task without an end, and without regeneration, end
         return {}
 
     def WriteAnalogF64(self, request: Any) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from rclpy.clock import Clock, ClockType
 from ...acquisition.claim import Claim
 from ...acquisition.safety.stop_latch import StopLatch
 from ...acquisition.streaming import StreamingAcquisition
-from ..messages.conversions import diagnostic
+from ..messages.conversions import diagnostic, to_stamp
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
@@ -55,7 +55,7 @@ class DriverDiagnostics:
         self._state = (DiagnosticStatus.STALE, "not configured", "")
         self._acquisition: StreamingAcquisition | None = None
         self._target = 0.0
-        self._seen = (time.monotonic(), 0, 0.0, 0.0)
+        self._seen = (time.monotonic(), 0, 0.0, 0.0, 0)
         self.refused = 0
         self.claim = Claim(0.0)
         node.create_timer(1.0, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -68,7 +68,7 @@ class DriverDiagnostics:
     def watch(self, acquisition: StreamingAcquisition | None, rate: float = 0.0) -> None:
         """Report the counters of an acquisition with its nominal rate [samples per s]; None ends this."""
         self._acquisition, self._target = acquisition, rate
-        self._seen = (time.monotonic(), 0, 0.0, 0.0)
+        self._seen = (time.monotonic(), 0, 0.0, 0.0, 0)
 
     def publish(self) -> None:
         """Publish one array with one status."""
@@ -86,12 +86,15 @@ class DriverDiagnostics:
         acquisition = self._acquisition
         if acquisition is not None:
             tally, now = acquisition.tally, time.monotonic()
-            then, samples, postponed, jumps = self._seen
+            then, samples, postponed, jumps, undated = self._seen
             covered = tally.samples + tally.never_measured
-            self._seen = (now, covered, tally.postponed, tally.clock_jumps)
+            self._seen = (now, covered, tally.postponed, tally.clock_jumps, tally.undated)
             if tally.postponed > postponed:
                 level = DiagnosticStatus.WARN
                 message = f"behind by {tally.postponed - postponed:.3g} s; the stamps moved"
+            elif tally.undated > undated:
+                level = DiagnosticStatus.WARN
+                message = "the clock is after January 2038, later than a message can hold; the stamps stand still"
             elif tally.clock_jumps > jumps:
                 level = DiagnosticStatus.WARN
                 message = f"the clock jumped by {tally.clock_jumps - jumps:.3g} s; the stamps moved with it"
@@ -110,5 +113,5 @@ class DriverDiagnostics:
             }
             tally.latest = 0.0
         array = DiagnosticArray(status=[diagnostic(level, self._name, message, stage, **values)])
-        array.header.stamp = self._node.get_clock().now().to_msg()
+        array.header.stamp = to_stamp(self._node.get_clock().now().nanoseconds)
         send(self._publisher, array)

@@ -128,23 +128,35 @@ class DriverNode(GuardedNode, LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         done = super().on_activate(state)
         self._failure = None
-        acquisition = session.start(lambda: now(self), topics.deliver, self._fail, lambda: topics.subscribers)
+        try:
+            acquisition = session.start(
+                lambda: now(self), topics.deliver, lambda error: self._fail(session, error), lambda: topics.subscribers
+            )
+        except Exception as error:
+            self._report_failure(error)
+            super().on_deactivate(state)
+            return TransitionCallbackReturn.FAILURE
         self._diagnostics.watch(acquisition, session.settings.real_time_factor / session.sample_period)
         self._diagnostics.state(DiagnosticStatus.OK, "streaming", session.limits.name)
         self.get_logger().info("active: samples flow")
         return done
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Ramp to the safe voltage, then stop the samples."""
-        is_safe = self._make_safe()
+        """Ramp to the safe voltage, then stop the samples; an error if the stage was not seen there."""
+        self._diagnostics.watch(None)
+        session, has_failed = self._session, self._failure is not None
+        try:
+            if session is not None:
+                session.make_safe()
+        except Exception as error:
+            self._report_failure(error)
+            has_failed = True
         done = super().on_deactivate(state)
-        if self._failure is not None:
+        if has_failed:
             return TransitionCallbackReturn.ERROR
-        if is_safe:
-            is_replay = self._session is not None and self._session.limits.ignores_drive
-            where = "" if is_replay else ": the stage is at its safe voltage"
-            self.get_logger().info(f"not active any more{where}")
-            self._diagnostics.state(DiagnosticStatus.OK, "configured, not active")
+        where = "" if session is not None and session.limits.ignores_drive else ": the stage is at its safe voltage"
+        self.get_logger().info(f"not active any more{where}")
+        self._diagnostics.state(DiagnosticStatus.OK, "configured, not active")
         return done
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -155,7 +167,6 @@ class DriverNode(GuardedNode, LifecycleNode):
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Bring the stage to its safe voltage and release it."""
-        self._make_safe()
         self._release()
         self.get_logger().info("shut down")
         self._diagnostics.state(DiagnosticStatus.STALE, "shut down")
@@ -163,39 +174,31 @@ class DriverNode(GuardedNode, LifecycleNode):
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Bring the stage to its safe voltage and release it. The node is then unconfigured."""
-        self._make_safe()
         self._release()
         super().on_error(state)
         return TransitionCallbackReturn.SUCCESS
 
-    def _make_safe(self) -> bool:
-        """Ramp to the safe voltage; False, with the reason reported, if the stage was not seen there."""
-        self._diagnostics.watch(None)
-        if self._session is not None:
-            try:
-                self._session.make_safe()
-            except Exception as error:
-                self._report_failure(error)
-                return False
-        return True
-
     def _release(self) -> None:
+        """Release the stage at its safe voltage, and after it the publishers, which report until then."""
         self._commands.detach()
+        self._diagnostics.watch(None)
         self._publish_in_force({row.name: row.value for row in IN_FORCE} | {"stopped": self._latch.is_set})
         session, self._session = self._session, None
         topics, self._topics = self._topics, None
-        if topics is not None:
-            topics.destroy()
         if session is not None:
             try:
                 session.close()
             except Exception as error:
                 self._report_failure(error)
+        if topics is not None:
+            topics.destroy()
 
-    def _fail(self, error: PiezoError) -> None:
+    def _fail(self, session: DriverSession, error: PiezoError) -> None:
         """Leave the active state in the thread of the executor, because the thread of the acquisition has ended."""
-        self._failure = error
         self._report_failure(error)
+        if session is not self._session:
+            return  # it has been released: a call of its stage returned too late
+        self._failure = error
         self.executor.create_task(self.guarded(self._give_up))
 
     def _give_up(self) -> None:

@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode
 from std_msgs.msg import Float64, String
 
@@ -31,6 +32,9 @@ from ..topics import advertise, advertise_lifecycle
 
 _STATES = {EventKind.BEGAN: "playing", EventKind.DONE: "done", EventKind.STOPPED: "stopped"}
 """State in `command_status` for every event."""
+
+_LONGEST_WAY = 0.5
+"""Longest wait until the subscribers have received the last status [s]; one of them may be suspended."""
 
 
 class DriverTopics:
@@ -70,7 +74,8 @@ class DriverTopics:
         return int(self._samples.get_subscription_count())
 
     def destroy(self) -> None:
-        """Remove the publishers."""
+        """Remove the publishers, after the last status has arrived."""
+        self._status.wait_for_all_acked(Duration(seconds=_LONGEST_WAY))
         for publisher in (self._samples, self._voltage, self._displacement, self._live, self._phase):
             self._node.destroy_lifecycle_publisher(publisher)
         self._node.destroy_publisher(self._status)
@@ -82,13 +87,15 @@ class DriverTopics:
         for event in begun:
             send(self._phase, String(data=str(event.phase)))
             self._publish_event(event, delivery.first)
-        if not send(self._samples, self._writer.write(replace(delivery.block, frame=self.frame))):
+        if delivery.block.size and not send(
+            self._samples, self._writer.write(replace(delivery.block, frame=self.frame))
+        ):
             message = f"the middleware did not accept a block of {delivery.block.size} samples; the block is lost"
             self._node.get_logger().warning(message)
         for event in ended:
             self._publish_event(event, delivery.first)
         last = delivery.first + delivery.block.size - 1
-        if last >= self._next_live:
+        if delivery.block.size and last >= self._next_live:
             self._next_live = (last // self._live_step + 1) * self._live_step
             self._publish_live(delivery.block)
 
@@ -113,7 +120,7 @@ class DriverTopics:
         level = DiagnosticStatus.WARN if event.kind is EventKind.STOPPED else DiagnosticStatus.OK
         state = _STATES[event.kind]
         began = self._first.get(phase.number, first + event.offset)
-        self._publish_status(level, phase.name, state, state, phase.stamp, phase.number, began)
+        self._publish_status(level, phase.name, event.reason or state, state, phase.stamp, phase.number, began)
 
     def _publish_status(
         self,

@@ -27,6 +27,9 @@ from ...errors import RecordError, printable
 from .cloud import from_cloud, to_cloud
 from .phase_text import PHASE_FIELD, phase_text
 
+_END_OF_TIME = 2**31 * 1_000_000_000
+"""Messages count seconds in 32 bits, and this time [ns] is the first one that does not fit."""
+
 Samples = NDArray[np.float64]
 
 COMMAND = {"time": "f8", "voltage": "f8"}
@@ -111,8 +114,8 @@ def values_of(status: DiagnosticStatus) -> dict[str, str]:
 
 
 def to_stamp(nanoseconds: int) -> Time:
-    """Message time of nanoseconds since the epoch."""
-    seconds, rest = divmod(nanoseconds, 1_000_000_000)
+    """Message time of nanoseconds since the epoch; the latest one that a message holds is in January 2038."""
+    seconds, rest = divmod(min(nanoseconds, _END_OF_TIME - 1), 1_000_000_000)
     return Time(sec=seconds, nanosec=rest)
 
 

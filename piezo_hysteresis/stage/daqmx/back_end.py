@@ -73,4 +73,5 @@ PARAMETERS: tuple[Row, ...] = (
 def open(values: Mapping[str, Any], opening: Opening) -> Stage:
     """Open a stage on a National Instruments card; raises StageError if it is missing or contradicts the values."""
     period = {"sample_period": opening.sample_period} if opening.sample_period else {}
-    return DaqmxStage(DaqmxSetup(**{**values, **period}))
+    assumed = {"assume_safe": values["assume_safe"] and opening.assumes_voltage}
+    return DaqmxStage(DaqmxSetup(**{**values, **period, **assumed}))

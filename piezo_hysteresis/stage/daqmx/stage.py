@@ -20,13 +20,14 @@ from contextlib import AbstractContextManager
 
 import numpy as np
 
-from ...errors import DeviceError, StageError
+from ...errors import DeviceError, StageError, UnknownVoltageError
 from ..agreement import Agreement
 from ..guard import guarded
 from ..limiter import Limiter
 from ..stage import Acquired, Description, Samples
+from .daqmx_error import DaqmxError
 from .setup import DaqmxSetup
-from .tasks import DaqmxError, Tasks
+from .tasks import Tasks
 
 _RAMP_PERIOD = 1e-3
 """Longest time between the samples of a ramp outside a stream [s]."""
@@ -62,15 +63,16 @@ class DaqmxStage:
         self._readings: Samples = np.empty(0)
         self._agreement = self._new_agreement()
         try:
-            readings = self._tasks.read_once()
-            found = self._found(readings)
+            found = self._found(self._tasks.read_once())
+            self._is_blind = found is None
             if found is None and not setup.assume_safe:
-                raise StageError(
+                raise UnknownVoltageError(
                     f"{self._description.name}: the voltage at the output is unknown, expected a card that reads it "
                     "back or a monitor; wire one (voltage_input), or make sure that the output is at its safe voltage "
                     "and set nidaqmx.assume_safe"
                 )
             self._voltage = self._description.safe_voltage if found is None else found
+            self._tasks.last_written = self._voltage
         except StageError:
             self._tasks.close()
             raise
@@ -228,13 +230,13 @@ class DaqmxStage:
             self._go(self._description.safe_voltage)
 
     def _abort(self) -> None:
-        """End a stream that has failed, and go to the safe voltage from where the output stands."""
-        self._tasks.abandon()
-        found = self._found(self._tasks.read_once())
-        if found is not None:
-            self._voltage = found
-        elif self._waiting.size:
-            self._voltage = float(self._waiting[0])
+        """End a stream that has failed, and go to the safe voltage from where the output stands, if that is certain."""
+        self._tasks.abandon(runs_dry=self._is_blind)
+        reported = self._found(self._tasks.read_once())
+        found = self._tasks.last_written if reported is None else reported
+        if found is None:
+            raise DaqmxError(f"{self._description.name}: neither the card nor a monitor reports the output")
+        self._voltage = found
         self._go(self._description.safe_voltage)
 
     def _go(self, goal: float) -> None:
@@ -258,3 +260,5 @@ class DaqmxStage:
     def _require_open(self) -> None:
         if self._closed:
             raise StageError(f"{self._description.name}: is closed, expected an open stage; make a new one")
+        if self._is_lost:
+            raise StageError(f"{self._description.name}: {self._unknown()}")

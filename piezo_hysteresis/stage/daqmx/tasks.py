@@ -17,13 +17,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import Any
 
 import numpy as np
 
-from ...errors import DeviceError, StageError
+from ...errors import StageError
 from ..description import Samples
+from .daqmx_error import DaqmxError, EmptyBufferError, UnsupportedError, reported
 from .setup import DaqmxSetup
 
 _RATE_TOLERANCE = 1e-4
@@ -37,20 +38,18 @@ _OPTIONS = (
 """Options of the link to the server."""
 
 
-class DaqmxError(DeviceError):
-    """NI-DAQmx reports a fault, or the card behaves wrongly."""
-
-
-class UnsupportedError(DaqmxError):
-    """The card refuses a request, and the link works."""
-
-
 class Tasks:
     """Tasks on a card, through the local driver or a gRPC device server.
 
     Parameters
     ----------
     setup : DaqmxSetup
+
+    Attributes
+    ----------
+    last_written : float or None
+        Voltage [V] at which the output stands when it has put out everything that was written; None where a fault
+        makes this uncertain. It is set from outside where the output is found.
 
     Raises
     ------
@@ -74,6 +73,8 @@ class Tasks:
         self._input: Any = None
         self._writer: Any = None
         self._reader: Any = None
+        self._sample_period, self._queued = setup.sample_period, 0.0  # the latter: duration of the output in the buffer
+        self.last_written: float | None = None
         self._connect()
 
     @property
@@ -84,6 +85,7 @@ class Tasks:
     def start(self, sample_period: float, first: Samples) -> None:
         """Stream from now on: output without regeneration, beginning with `first`; input on the output's clock."""
         s, streams, constants = self._setup, self._nidaqmx, self._nidaqmx.constants
+        self._sample_period, self._queued = sample_period, first.size * sample_period
         size = max(4 * first.size, round(1.0 / sample_period))
         continuous = constants.AcquisitionType.CONTINUOUS
         with self._faults("starting output and input"):
@@ -105,11 +107,13 @@ class Tasks:
                 self._output.start()
             except BaseException:
                 self.abandon()
+                self.last_written = float(first[-1])  # `first` does not move the output
                 raise
 
     def write(self, drive: Samples) -> None:
         """Append drive voltages [V] to the output."""
-        with self._faults("writing output"):
+        self._queued = self._setup.lead + drive.size * self._sample_period
+        with self._puts_out(drive), self._faults("writing output"):
             self._writer.write_many_sample(drive, self._setup.timeout)
 
     def read(self, count: int) -> Samples:
@@ -135,8 +139,16 @@ class Tasks:
         if fault is not None:
             raise fault
 
-    def abandon(self) -> None:
-        """End both tasks if they can still be ended; the next call uses a new link."""
+    def abandon(self, *, runs_dry: bool = False) -> None:
+        """End both tasks if they can still be ended; the next call uses a new link.
+
+        Parameters
+        ----------
+        runs_dry : bool
+            Wait first until the output has put out everything that was written, so that `last_written` holds.
+        """
+        if self.is_running and not (runs_dry and self.last_written is not None and self._has_run_dry()):
+            self.last_written = None
         with suppress(DaqmxError):
             self.stop()
         self.close()
@@ -148,9 +160,10 @@ class Tasks:
         finite = self._nidaqmx.constants.AcquisitionType.FINITE
         with self._faults("putting out a ramp"), self._output_task() as task:
             task.timing.cfg_samp_clk_timing(1 / sample_period, sample_mode=finite, samps_per_chan=drive.size)
-            task.write(drive, auto_start=False)
-            task.start()
-            task.wait_until_done(drive.size * sample_period + s.timeout)
+            with self._puts_out(drive):
+                task.write(drive, auto_start=False)
+                task.start()
+                task.wait_until_done(drive.size * sample_period + s.timeout)
 
     def output(self) -> float | None:
         """Voltage at the output [V], read back by the card itself; None if it cannot."""
@@ -165,7 +178,7 @@ class Tasks:
 
     def write_once(self, drive: float) -> None:
         """Put out one voltage [V] without a clock."""
-        with self._faults("writing one voltage"), self._output_task() as task:
+        with self._faults("writing one voltage"), self._output_task() as task, self._puts_out(np.full(1, drive)):
             task.write(drive, auto_start=True)
 
     def read_once(self) -> Samples:
@@ -223,16 +236,27 @@ class Tasks:
                 channels.add_ai_voltage_chan(f"{s.device}/{name}", min_val=-s.sensor_range, max_val=s.sensor_range)
         return task
 
+    def _has_run_dry(self) -> bool:
+        """Wait until the buffer of the output is empty; False if the card does not say that it is."""
+        try:
+            with self._faults("waiting for the end of the output"):
+                self._output.wait_until_done(self._queued + self._setup.timeout)
+        except EmptyBufferError:
+            return True
+        except DaqmxError:
+            pass
+        return False
+
     @contextmanager
-    def _faults(self, doing: str) -> Iterator[None]:
-        errors = self._nidaqmx.errors
+    def _puts_out(self, drive: Samples) -> Iterator[None]:
+        """Know the last voltage that was written; it is uncertain after a fault, unless the output has stopped."""
+        before, self.last_written = self.last_written, None
         try:
             yield
-        except DaqmxError:
+        except EmptyBufferError as error:
+            self.last_written = float(drive[error.taken - 1]) if error.taken else before
             raise
-        except (errors.Error, OSError, ValueError) as error:
-            words = " ".join(str(error).split())
-            kind = UnsupportedError if isinstance(error, errors.DaqError) else DaqmxError
-            if "DEADLINE_EXCEEDED" in str(getattr(error, "rpc_code", "")):
-                words = f"no answer within {self._setup.timeout:g} s from {self._setup.server}"
-            raise kind(f"NI-DAQmx, {self._setup.device}: {doing} failed: {words[:300]}") from None
+        self.last_written = float(drive[-1])
+
+    def _faults(self, doing: str) -> AbstractContextManager[None]:
+        return reported(self._nidaqmx.errors, self._setup, doing)

@@ -14,6 +14,8 @@
 
 """``piezo calibrate`` measures a card that is wired back to itself, and the driver reads what it wrote."""
 
+import signal
+
 import numpy as np
 import pytest
 
@@ -33,8 +35,13 @@ WAVE = 2.0 - 2.0 * np.cos(2 * np.pi * np.arange(4000) / 2000)
 
 
 @pytest.fixture
-def address():
-    with DaqmxServer(Card(SimulatedStage(seed=3), speed=float("inf"))) as server:
+def card():
+    return Card(SimulatedStage(seed=3), speed=float("inf"))
+
+
+@pytest.fixture
+def address(card):
+    with DaqmxServer(card) as server:
         yield f"127.0.0.1:{server.port}"
 
 
@@ -78,6 +85,34 @@ def test_a_card_that_a_driver_holds_is_left_alone(piezo, address, tmp_path):
     again = DaqmxStage(setup)
     assert again.voltage == pytest.approx(3.0, abs=1e-3)
     again.close()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
+def test_signals_leave_no_output_energised(piezo, card, address, tmp_path, monkeypatch, number):
+    """Neither the first one, in the measurement, nor others while the output is brought to its safe voltage."""
+    file, exchange, close = tmp_path / "card.yaml", DaqmxStage.exchange, DaqmxStage.close
+    seen = []
+
+    def interrupted(stage, drive):
+        exchange(stage, drive)
+        seen.append(card.voltage)
+        signal.raise_signal(number)
+
+    def interrupted_again(stage):
+        signal.raise_signal(number)
+        close(stage)
+
+    before = signal.getsignal(number)
+    monkeypatch.setattr(DaqmxStage, "exchange", interrupted)
+    monkeypatch.setattr(DaqmxStage, "close", interrupted_again)
+    done = piezo("calibrate", "Dev1", "--server", address, "--wired-input", "ai2", "-o", file)
+    assert done.status == 130
+    assert done.err.strip().endswith("Dev1 is at 0 V; nothing was written")
+    assert seen[0] > 0.0
+    assert card.voltage == 0.0
+    assert not file.exists()
+    assert signal.getsignal(number) is before
+    StageLock([f"device {DaqmxSetup('Dev1', max_slew_rate=1.0).description().name}"]).release()
 
 
 @pytest.mark.parametrize(

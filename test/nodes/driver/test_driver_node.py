@@ -195,7 +195,10 @@ def test_a_failing_stage_is_made_safe_reported_and_can_be_tried_again(lab, monke
 
 
 def test_a_stage_that_was_not_seen_at_its_safe_voltage_is_not_reported_there(lab, monkeypatch):
+    make_safe = DriverSession.make_safe
+
     def fail(session):
+        make_safe(session)
         raise StageError("not at the safe voltage within 2 s")
 
     node = lab.add(DriverNode, **IDEAL)
@@ -204,7 +207,8 @@ def test_a_stage_that_was_not_seen_at_its_safe_voltage_is_not_reported_there(lab
     reported = lab.diagnostics()
     with monkeypatch.context() as patched:
         patched.setattr(DriverSession, "make_safe", fail)
-        assert lab.transition("deactivate")
+        assert not lab.transition("deactivate")
+    assert lab.state() == "unconfigured"
     reported.clear()
     lab.wait(lambda: any("not at the safe voltage" in s.message for a in reported for s in a.status), "the reason")
     assert not any("not active" in s.message for a in reported for s in a.status)

@@ -33,6 +33,13 @@ def over_the_wire(message):
     return deserialize_message(serialize_message(message), type(message))
 
 
+@given(st.integers(0, 2**63 - 1))
+def test_every_date_of_a_clock_has_a_message_time(nanoseconds):
+    """Messages hold dates before 2038-01-19, 03:14:08 UTC; later ones become the last of them."""
+    stamp = over_the_wire(conversions.to_stamp(nanoseconds))
+    assert conversions.from_stamp(stamp) == min(nanoseconds, 2**31 * 10**9 - 1)
+
+
 @given(hnp.arrays(np.float64, st.integers(1, 50), elements=finite))
 def test_a_waveform_is_converted_and_back_bit_for_bit(voltage):
     message = over_the_wire(conversions.command_to_cloud(voltage, 2e-5, "triangle"))

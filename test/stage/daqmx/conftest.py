@@ -55,8 +55,9 @@ def rig():
     """Make rigs: emulated card with faults, back end opened with changes of the setup."""
     made = []
 
-    def make(*faults: str, plant=None, seed=3, speed=math.inf, opened=True, **changes) -> Rig:
-        card = Card(SimulatedStage(plant, seed=seed), speed=speed, faults=[FAULTS.parse(f) for f in faults])
+    def make(*faults: str, plant=None, seed=3, speed=math.inf, opened=True, reads_back=True, **changes) -> Rig:
+        parsed = [FAULTS.parse(f) for f in faults]
+        card = Card(SimulatedStage(plant, seed=seed), speed=speed, faults=parsed, reads_back=reads_back)
         rig = Rig(card, DaqmxServer(card))
         made.append(rig)
         rig.server.__enter__()

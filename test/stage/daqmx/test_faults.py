@@ -103,6 +103,54 @@ def test_a_lost_link_leaves_the_voltage_unknown_and_is_reported(rig, streamed, s
     r.stage.close()
 
 
+def blind(rig, *faults):
+    """A card that does not report its output, and every voltage that it puts out from now on."""
+    r = rig(*faults, reads_back=False, voltage_input="", assume_safe=True, max_slew_rate=1000.0)
+    exchange, wire = r.card._stage.exchange, [0.0]
+
+    def kept(voltage):
+        wire.extend(voltage)
+        return exchange(voltage)
+
+    r.card._stage.exchange = kept
+    return r, wire
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "underflow@WriteAnalogF64:4",
+        "underflow@ReadAnalogF64:4",
+        "late@ReadAnalogF64:4",
+        "link_lost@ReadAnalogF64:4",
+        "short_read@ReadAnalogF64:4",
+        "duplicated@ReadAnalogF64:4",
+    ],
+)
+def test_a_card_that_does_not_report_its_output_goes_down_from_the_last_voltage_it_was_given(rig, streamed, fault):
+    r, wire = blind(rig, fault)
+    with pytest.raises(StageError, match=r"safe voltage, 0 V"):
+        streamed(r.stage, WAVE, *BLOCKS)
+    assert max(wire) > 2.0
+    assert wire[-1] == 0.0
+    assert np.abs(np.diff(wire)).max() <= 1000.0 * r.stage.sample_period + 20.0 / 2**16, "one step of the converter"
+    streamed(r.stage, WAVE, *BLOCKS)
+    r.stage.close()
+
+
+@pytest.mark.parametrize("fault", ["error@WriteAnalogF64:4", "link_lost@WriteAnalogF64:4"])
+def test_a_card_that_does_not_report_its_output_is_not_moved_from_a_guess(rig, streamed, fault):
+    """Nobody knows how much of a block that failed was put out."""
+    r, wire = blind(rig, fault)
+    with pytest.raises(StageError, match=r"voltage of the stage is unknown, last commanded .* by hand"):
+        streamed(r.stage, WAVE, *BLOCKS)
+    moved = len(wire)
+    for use in (r.stage.safe, lambda: r.stage.set_voltage(0.0), lambda: r.stage.exchange(WAVE[:400]), r.stage.close):
+        with pytest.raises(StageError, match="unknown"):
+            use()
+    assert set(wire[moved:]) <= {wire[moved - 1]}, "a reading of the inputs moves nothing"
+
+
 def test_a_server_that_went_away_and_came_back_is_found_again(rig, streamed, ideal):
     r = rig(plant=ideal())
     streamed(r.stage, WAVE[:800], 400)
