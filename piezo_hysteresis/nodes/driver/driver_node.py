@@ -128,6 +128,7 @@ class DriverNode(GuardedNode, LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         done = super().on_activate(state)
         self._failure = None
+        topics.restart()
         acquisition = session.start(lambda: now(self), topics.deliver, self._fail, lambda: topics.subscribers)
         self._diagnostics.watch(acquisition, session.settings.real_time_factor / session.sample_period)
         self._diagnostics.state(DiagnosticStatus.OK, "streaming", session.limits.name)

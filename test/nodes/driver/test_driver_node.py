@@ -79,9 +79,10 @@ def test_room_for_large_blocks_is_shared_with_nodes_that_have_less(lab):
 
 def test_deactivate_ramps_down_and_activate_streams_again(lab):
     lab.driver(**IDEAL)
-    samples = lab.streaming()
+    samples, live = lab.streaming(), lab.listen(Float64, "voltage")
     lab.publisher(Float64, "set_voltage").publish(Float64(data=2.0))
-    lab.wait(lambda: samples.newest.voltage[-1] == 2.0, "the set-point")
+    lab.wait(lambda: samples.newest.voltage[-1] == 2.0 and samples.newest.index[-1] > 100_000, "the set-point")
+    streamed = int(samples.newest.index[-1])
     assert lab.transition("deactivate")
     assert lab.state() == "inactive"
     lab.wait(lambda: samples.newest.voltage[-1] == 0.0, "the safe voltage")
@@ -89,6 +90,9 @@ def test_deactivate_ramps_down_and_activate_streams_again(lab):
     blocks = len(samples.blocks)
     assert lab.transition("activate")
     lab.wait(lambda: len(samples.blocks) > blocks + 5, "blocks again")
+    live.clear()
+    lab.wait(lambda: 20_000 < samples.newest.index[-1] < streamed, "20 000 samples")
+    assert len(live) > 5, "the scalars begin with the samples, not where the first acquisition ended"
     assert all(lab.transition(name) for name in ("deactivate", "cleanup", "configure", "activate"))
     blocks = len(samples.blocks)
     lab.wait(lambda: len(samples.blocks) > blocks + 5, "blocks of the stage opened again")
