@@ -27,6 +27,7 @@ from ...compensation import IterativeLearning, Limits, Plan, plan
 from ...errors import StageError, printable
 from ...identification.protocol.phases import ProtocolPhase
 from ..identification.driver_client import DriverClient
+from ..identification.wait_limit import WaitLimit
 from .applied_state import AppliedState
 from .status import CompensationStatus
 from .tracking import Tracking
@@ -166,21 +167,29 @@ class PathRuns:
         Raises
         ------
         StageError
-            If the driver refuses or stops the drive, or no samples arrive.
+            If the driver refuses or stops the drive or is no longer there, or no samples arrive.
         """
         tracking = self.tracking = Tracking(found)
         self._status.show("playing", described(found), name, expected=found.expected.total)
         self._driver.send(ProtocolPhase(name, found.voltage, found.sample_period))
-        waited = 0.0
+        # a device that plays from its memory sends nothing before the end
+        longest_silence = _STARTED_WITHIN + 2.0 * found.voltage.size * found.sample_period
+        before, limit = (False, 0), WaitLimit(_STARTED_WITHIN)
         while not tracking.is_whole:
             state = self._driver.state
             if state in ("refused", "stopped"):
                 raise StageError(f"the driver {state} it: {self._driver.reason}")
+            if self._driver.limits is None:
+                raise StageError(f"{self._driver.missing} is no longer there; see the log of the driver")
             if tracking.first is None and state in ("playing", "done"):
                 tracking.begin(self._driver.first_index)
-            waited = 0.0 if state == "playing" else waited + TICK
-            if waited > _STARTED_WITHIN:
-                raise StageError(f"the driver is '{state}' and sends no samples for {_STARTED_WITHIN:g} s")
+            longest = longest_silence if state == "playing" else _STARTED_WITHIN
+            if (now := (state == "playing", tracking.received)) != before:
+                before, limit = now, WaitLimit(longest)
+            if limit.has_passed():
+                raise StageError(
+                    f"the driver is '{state}' and sends no samples of the drive for {longest:g} s; is it alive?"
+                )
             yield
         return tracking
 
