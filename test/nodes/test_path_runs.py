@@ -12,17 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The job of a path ends where its driver is gone or silent."""
+"""The job of a path ends where its driver is gone or silent, and nobody waits for a plan that nobody wants."""
 
+import signal
+import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from std_srvs.srv import Trigger
 
 from piezo_hysteresis.acquisition.sample_block import SampleBlock
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.nodes.compensation import path_runs
 from piezo_hysteresis.nodes.identification import wait_limit
+
+from .test_compensation_node import NODE, Compensation, scan
 
 pytestmark = pytest.mark.nodes
 
@@ -97,3 +102,25 @@ def test_a_path_that_goes_on_ends_with_its_last_sample(run, clock):
         run.runs.tracking.take(block(begin, 100))
     with pytest.raises(StopIteration):
         next(run.job)
+
+
+def test_neither_the_next_plan_nor_the_end_waits_for_a_plan_that_was_stopped(lab):
+    """A plan of this many samples never ends."""
+    endless = scan(duration=0.3)
+    code = (
+        "import sys, threading; from piezo_hysteresis.nodes.compensation import path_runs; plan = path_runs.plan; "
+        f"path_runs.plan = lambda model, wanted, *a, **k: plan(model, wanted, *a, **k) if wanted.size != {endless.size}"
+        " else threading.Event().wait(); "
+        "from piezo_hysteresis.nodes.compensation.compensation_node import main; sys.exit(main())"
+    )
+    node = Compensation(lab, play=False, program=[sys.executable, "-c", code], fresh=True)
+    node.send(endless, "endless")
+    node.until("endless", "planning")
+    assert lab.call(Trigger, f"{NODE}/stop").success
+    assert lab.call(Trigger, "driver_node/release").success
+    node.send(scan(), "next")
+    node.until("next", "planned")
+    node.send(endless, "endless_again")
+    node.until("endless_again", "planning")
+    node.process.signal(signal.SIGTERM)
+    assert node.process.wait() == 0

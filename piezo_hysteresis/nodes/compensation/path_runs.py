@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Generator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from typing import Any
 
 import numpy as np
@@ -76,13 +77,8 @@ class PathRuns:
         values: Mapping[str, Any],
     ) -> None:
         self._driver, self._status, self._values = driver, status, values
-        self._pool = ThreadPoolExecutor(1, "plan")
         self.tracking: Tracking | None = None
         self.last: tuple[str, Plan] | None = None
-
-    def close(self) -> None:
-        """Refuse all further plans."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
 
     def planned(self, applied: AppliedState, wanted: np.ndarray, limits: Limits, way_back: bool = True) -> Plan:
         """Plan of a path (n,) [m] that starts at the present state of the stage, which `applied` contains."""
@@ -104,11 +100,6 @@ class PathRuns:
                 raise StageError(f"waited {_STARTED_WITHIN:g} s for {missing}")
             yield
 
-    def _in_thread(self, future: Future[Any]) -> Generator[None, None, Any]:
-        while not future.done():
-            yield
-        return future.result()
-
     def _planned_at_rest(
         self, applied: AppliedState, wanted: np.ndarray, limits: Limits
     ) -> Generator[None, None, Plan]:
@@ -122,7 +113,7 @@ class PathRuns:
         near, deadline = _REST * (limits.voltage_max - limits.voltage_min), time.monotonic() + _STARTED_WITHIN
         while True:
             watched = time.monotonic() + _REST_TIME
-            found: Plan = yield from self._in_thread(self._pool.submit(self.planned, applied, wanted, limits))
+            found: Plan = yield from _in_thread(self.planned, applied, wanted, limits)
             while time.monotonic() < watched:
                 yield
             begin = found.start.inputs[0]
@@ -228,7 +219,7 @@ class PathRuns:
                     f"the stage is claimed by {printable(self._driver.holder) or 'nobody'}, not by this node"
                 )
             tracking = yield from self._play(f"{name}_{number}", learning.next)
-            yield from self._in_thread(self._pool.submit(learning.update, tracking.measured, applied.state))
+            yield from _in_thread(learning.update, tracking.measured, applied.state)
             now = learning.rounds[-1]
             reason = f"round {number}: {1e9 * now.rms:.1f} nm rms, expected {1e9 * now.expected:.1f} nm"
             index = tracking.path_index
@@ -244,3 +235,19 @@ class PathRuns:
             f"; {learning.reason}" if learning.reason else ""
         )
         self._status.show("done", reason, name, rms=last.rms, expected=last.expected, best=best.rms)
+
+
+def _in_thread(compute: Callable[..., Any], *arguments: object) -> Generator[None, None, Any]:
+    """Compute in a thread of its own. Neither the next job nor the end of the process waits for it after a stop."""
+    future: Future[Any] = Future()
+
+    def call() -> None:
+        try:
+            future.set_result(compute(*arguments))
+        except BaseException as error:
+            future.set_exception(error)
+
+    threading.Thread(target=call, name="plan", daemon=True).start()
+    while not future.done():
+        yield
+    return future.result()
