@@ -46,6 +46,7 @@ from .diagnostics import ModelDiagnostics
 from .publishers import ModelTopics
 from .recalibrator import Recalibrator
 from .residual_alarm import ALARM, ResidualAlarm
+from .stream_period import TOLERANCE, StreamPeriod
 
 _SOURCE = "model node"
 """Source of the parameters of the model node."""
@@ -70,7 +71,7 @@ class ModelNode(GuardedNode):
         compile_kernels(self.get_logger().info)
         self._model: Model | None = None
         self._predictor: Predictor | None = None
-        self._before: SampleBlock | None = None
+        self._period = StreamPeriod()
         self._reader = SampleReader()
         self._topics = ModelTopics(self)
         self._changes = ChangeReporter(self, self._values)
@@ -111,16 +112,10 @@ class ModelNode(GuardedNode):
 
     def _predictor_for(self, block: SampleBlock) -> Predictor | None:
         """The predictor of the stream. Another sample period gives a new one; None while it is unknown."""
-        before, self._before = self._before, block
-        period = block.sample_period
-        if period is None and before is not None:
-            steps = (int(block.index[0]) - int(before.index[-1])) % 2**32
-            elapsed = (block.stamp - before.stamp) * 1e-9 - float(before.time[-1])
-            period = elapsed / steps if steps else None
-        present = self._predictor
-        if period is None or not period > 0:
+        period, present = self._period.of(block), self._predictor
+        if period is None:
             return present
-        if present is None or abs(period / present.sample_period - 1.0) > 0.01:
+        if present is None or abs(period / present.sample_period - 1.0) > TOLERANCE:
             self._predictor = Predictor(round_period(period, 1e-6), rms_time=self._values["rms_time"])
             self._diagnostics.follow(self._predictor)
             if self._model is not None:
