@@ -150,7 +150,7 @@ TOPICS: dict[str, Topic] = {
         Topic("set_displacement", Float64, COMMAND, "m", "", ANYONE, readers=("compensation",)),
         Topic("tracking_error", Float64, COMMAND, "m", "50 Hz while a trajectory plays", "compensation"),
         Topic("tracking_rms", Float64, COMMAND, "m", "50 Hz while a trajectory plays", "compensation"),
-        Topic(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), "", "1 Hz", ALL),
+        Topic(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), "", "1 Hz", ALL, readers=("driver",)),
     )
 }  # fmt: skip
 """Topics of an axis by name, in the order of the docs."""
