@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter as RosParameter
@@ -26,7 +25,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from ...acquisition.sample_block import SampleBlock
-from ...errors import ModelError, PiezoError, RecordError
+from ...errors import PiezoError, RecordError
 from ...model.model import Model
 from ...model.model_file import load, loads
 from ...model.model_parameters import model_hash
@@ -143,7 +142,7 @@ class ModelNode(GuardedNode):
 
     def _load(self, path: str) -> None:
         try:
-            self._follow(_read(path))
+            self._follow(load(path))
         except PiezoError as error:
             self._diagnostics.refused(f"model_file: {error}")
 
@@ -169,7 +168,7 @@ class ModelNode(GuardedNode):
         try:
             for parameter in parameters:
                 if parameter.name == "model_file":
-                    _read(str(rows[parameter.name].check(parameter.value)))
+                    load(str(rows[parameter.name].check(parameter.value)))
                 elif parameter.name in rows:
                     raise RecordError(f"{parameter.name} is read at start; give it then")
         except PiezoError as error:
@@ -180,14 +179,6 @@ class ModelNode(GuardedNode):
         for parameter in parameters:
             if parameter.name == "model_file":
                 self._load(parameter.value)
-
-
-def _read(path: str) -> Model:
-    """Read the model of a file. A pipe or a device is refused, because the node would wait for it."""
-    place = Path(path).expanduser()
-    if place.exists() and not place.is_file():
-        raise ModelError(f"{path}: got no regular file, expected a model file")
-    return load(place)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
