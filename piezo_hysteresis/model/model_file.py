@@ -25,7 +25,8 @@ from pathlib import Path
 
 import yaml
 
-from ..errors import ModelError
+from ..errors import ModelError, RecordingError
+from ..yaml_file import read_regular_file
 from .model import Model
 from .model_parameters import COVARIANCE, PREFIX, SCALES, from_parameters, to_parameters
 from .parameter_file import LONGEST_TEXT, Entry, entry, parameters, quoted
@@ -35,6 +36,9 @@ _HEADER = """\
 # After editing a number by hand, delete the line `hash`.
 """
 """First lines of a model file."""
+
+_LONGEST_CHARACTER = 4
+"""Bytes of a character in UTF-8 at most."""
 
 _PROVENANCE = {
     "free_run_error": "m; rms in free run, on data left out where there were any",
@@ -138,12 +142,13 @@ def load(path: str | Path) -> Model:
     Raises
     ------
     ModelError, ParameterError
-        If there is no such file, or as `loads`.
+        If there is no such file, if it is a folder, a pipe or a device, or as `loads`.
     """
     path = Path(path).expanduser()
     try:
-        with path.open(encoding="utf-8") as file:
-            text = file.read(LONGEST_TEXT + 1)
+        text = read_regular_file(path, _LONGEST_CHARACTER * (LONGEST_TEXT + 1)).decode("utf-8")
+    except RecordingError as error:
+        raise ModelError(str(error)) from None
     except OSError as error:
         raise ModelError(f"{path}: {error.strerror or error}, expected a model file") from None
     except UnicodeError:

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -150,7 +151,7 @@ TOPICS: dict[str, Topic] = {
         Topic("set_displacement", Float64, COMMAND, "m", "", ANYONE, readers=("compensation",)),
         Topic("tracking_error", Float64, COMMAND, "m", "50 Hz while a trajectory plays", "compensation"),
         Topic("tracking_rms", Float64, COMMAND, "m", "50 Hz while a trajectory plays", "compensation"),
-        Topic(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), "", "1 Hz", ALL),
+        Topic(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), "", "1 Hz", ALL, readers=("driver",)),
     )
 }  # fmt: skip
 """Topics of an axis by name, in the order of the docs."""
@@ -159,7 +160,7 @@ TOPICS: dict[str, Topic] = {
 def advertise(node: Node, name: str) -> Any:
     """A publisher of one of `TOPICS`; raises ParameterError where a parameter names an unknown quality of service."""
     topic = TOPICS[name]
-    with _override_named(topic):
+    with _override_named(node, topic):
         return node.create_publisher(
             topic.type, topic.name, copy(topic.quality), qos_overriding_options=topic.overriding
         )
@@ -168,7 +169,7 @@ def advertise(node: Node, name: str) -> Any:
 def advertise_lifecycle(node: LifecycleNode, name: str) -> Any:
     """As `advertise`; it publishes nothing while its node is not active."""
     topic = TOPICS[name]
-    with _override_named(topic):
+    with _override_named(node, topic):
         quality = copy(topic.quality)
         return node.create_lifecycle_publisher(topic.type, topic.name, quality, qos_overriding_options=topic.overriding)
 
@@ -195,15 +196,19 @@ def subscribe(node: Node, name: str, callback: Callable[[Any], None], *, deep: b
     """
     topic = TOPICS[name]
     quality = topic.deep if deep else copy(topic.quality)
-    with _override_named(topic):
+    with _override_named(node, topic):
         return node.create_subscription(
             topic.type, topic.name, callback, quality, raw=raw, qos_overriding_options=topic.overriding
         )
 
 
 @contextmanager
-def _override_named(topic: Topic) -> Iterator[None]:
+def _override_named(node: Node, topic: Topic) -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:  # rclpy raises this for an unknown policy
+        beginning = f"{QOS_OVERRIDES}{node.resolve_topic_name(topic.name)}."
+        is_given = any(name.startswith(beginning) for name in node._parameter_overrides)
+        if isinstance(error, rclpy_implementation.RCLError) and not is_given:
+            raise
         raise ParameterError(f"qos_overrides of {topic.name}: {error}; expected a policy of ROS 2") from None

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -250,6 +251,13 @@ def test_a_missing_file_and_a_foreign_one(tmp_path: Path) -> None:
     (tmp_path / "image.yaml").write_bytes(b"\xff\xd8\xff")
     with pytest.raises(ModelError, match="UTF-8"):
         load(tmp_path / "image.yaml")
+
+
+def test_a_pipe_and_a_folder_are_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path, tmp_path / "pipe"):
+        with pytest.raises(ModelError, match="expected a regular file"):
+            load(path)
 
 
 def test_the_published_stage_contains_the_values_of_the_paper() -> None:

@@ -15,12 +15,14 @@
 """Parameters change the quality of service of a topic, and words that mean nothing are refused."""
 
 import pytest
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64
 
 from piezo_hysteresis.errors import ParameterError
 from piezo_hysteresis.nodes.messages.frame import frame_name
+from piezo_hysteresis.nodes.topics import advertise
 
 pytestmark = pytest.mark.nodes
 
@@ -43,6 +45,15 @@ def test_an_unknown_qos_policy_is_refused_in_one_line(lab):
     node = lab.start("model_node", "-p", refused, fresh=True)
     assert node.wait() == 2
     assert "qos_overrides of prediction" in node.output
+
+
+def test_a_fault_of_the_middleware_is_no_wrong_qos_override(lab, monkeypatch):
+    def fail(*arguments, **named):
+        raise rclpy_implementation.RCLError("out of time")
+
+    monkeypatch.setattr(lab.node, "create_publisher", fail)
+    with pytest.raises(rclpy_implementation.RCLError, match="out of time"):
+        advertise(lab.node, "prediction")
 
 
 @pytest.mark.parametrize("wrong", ["/stage_x", "a b", "x/", "a//b", "µ"])

@@ -160,7 +160,7 @@ def test_the_security_policy_allows_exactly_the_topics_of_a_node(nodes, node):
     if node == "identification_node":
         own |= {"/" + name.lstrip("/") for name in TOPICS}  # while it records
     if node == "driver_node":
-        own.add("/samples")  # before it begins, to find another driver
+        own |= {"/samples", "/diagnostics"}  # before it begins, to find another driver
     clock = set() if node == "driver_node_stop" else {"/clock"}  # a stop asks no clock
     heard, recorded = own | clock, {"/*"} if node == "identification_node" else set()
     assert policy.get("subscribe", set()) - recorded <= heard

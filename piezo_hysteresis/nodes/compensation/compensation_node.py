@@ -89,7 +89,6 @@ class CompensationNode(GuardedNode):
         asked = self._driver.stop() if drives else None
         if asked is not None:
             self.executor.spin_until_future_complete(asked, timeout_sec=2.0)
-        self._runs.close()
 
     def _on_model(self, message: String) -> None:
         try:

@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Generator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from ...compensation import IterativeLearning, Limits, Plan, plan
 from ...errors import StageError, printable
 from ...identification.protocol.phases import ProtocolPhase
 from ..identification.driver_client import DriverClient
+from ..identification.wait_limit import WaitLimit
 from .applied_state import AppliedState
 from .status import CompensationStatus
 from .tracking import Tracking
@@ -75,13 +77,8 @@ class PathRuns:
         values: Mapping[str, Any],
     ) -> None:
         self._driver, self._status, self._values = driver, status, values
-        self._pool = ThreadPoolExecutor(1, "plan")
         self.tracking: Tracking | None = None
         self.last: tuple[str, Plan] | None = None
-
-    def close(self) -> None:
-        """Refuse all further plans."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
 
     def planned(self, applied: AppliedState, wanted: np.ndarray, limits: Limits, way_back: bool = True) -> Plan:
         """Plan of a path (n,) [m] that starts at the present state of the stage, which `applied` contains."""
@@ -103,11 +100,6 @@ class PathRuns:
                 raise StageError(f"waited {_STARTED_WITHIN:g} s for {missing}")
             yield
 
-    def _in_thread(self, future: Future[Any]) -> Generator[None, None, Any]:
-        while not future.done():
-            yield
-        return future.result()
-
     def _planned_at_rest(
         self, applied: AppliedState, wanted: np.ndarray, limits: Limits
     ) -> Generator[None, None, Plan]:
@@ -121,7 +113,7 @@ class PathRuns:
         near, deadline = _REST * (limits.voltage_max - limits.voltage_min), time.monotonic() + _STARTED_WITHIN
         while True:
             watched = time.monotonic() + _REST_TIME
-            found: Plan = yield from self._in_thread(self._pool.submit(self.planned, applied, wanted, limits))
+            found: Plan = yield from _in_thread(self.planned, applied, wanted, limits)
             while time.monotonic() < watched:
                 yield
             begin = found.start.inputs[0]
@@ -166,21 +158,29 @@ class PathRuns:
         Raises
         ------
         StageError
-            If the driver refuses or stops the drive, or no samples arrive.
+            If the driver refuses or stops the drive or is no longer there, or no samples arrive.
         """
         tracking = self.tracking = Tracking(found)
         self._status.show("playing", described(found), name, expected=found.expected.total)
         self._driver.send(ProtocolPhase(name, found.voltage, found.sample_period))
-        waited = 0.0
+        # a device that plays from its memory sends nothing before the end
+        longest_silence = _STARTED_WITHIN + 2.0 * found.voltage.size * found.sample_period
+        before, limit = (False, 0), WaitLimit(_STARTED_WITHIN)
         while not tracking.is_whole:
             state = self._driver.state
             if state in ("refused", "stopped"):
                 raise StageError(f"the driver {state} it: {self._driver.reason}")
+            if self._driver.limits is None:
+                raise StageError(f"{self._driver.missing} is no longer there; see the log of the driver")
             if tracking.first is None and state in ("playing", "done"):
                 tracking.begin(self._driver.first_index)
-            waited = 0.0 if state == "playing" else waited + TICK
-            if waited > _STARTED_WITHIN:
-                raise StageError(f"the driver is '{state}' and sends no samples for {_STARTED_WITHIN:g} s")
+            longest = longest_silence if state == "playing" else _STARTED_WITHIN
+            if (now := (state == "playing", tracking.received)) != before:
+                before, limit = now, WaitLimit(longest)
+            if limit.has_passed():
+                raise StageError(
+                    f"the driver is '{state}' and sends no samples of the drive for {longest:g} s; is it alive?"
+                )
             yield
         return tracking
 
@@ -219,7 +219,7 @@ class PathRuns:
                     f"the stage is claimed by {printable(self._driver.holder) or 'nobody'}, not by this node"
                 )
             tracking = yield from self._play(f"{name}_{number}", learning.next)
-            yield from self._in_thread(self._pool.submit(learning.update, tracking.measured, applied.state))
+            yield from _in_thread(learning.update, tracking.measured, applied.state)
             now = learning.rounds[-1]
             reason = f"round {number}: {1e9 * now.rms:.1f} nm rms, expected {1e9 * now.expected:.1f} nm"
             index = tracking.path_index
@@ -235,3 +235,19 @@ class PathRuns:
             f"; {learning.reason}" if learning.reason else ""
         )
         self._status.show("done", reason, name, rms=last.rms, expected=last.expected, best=best.rms)
+
+
+def _in_thread(compute: Callable[..., Any], *arguments: object) -> Generator[None, None, Any]:
+    """Compute in a thread of its own. Neither the next job nor the end of the process waits for it after a stop."""
+    future: Future[Any] = Future()
+
+    def call() -> None:
+        try:
+            future.set_result(compute(*arguments))
+        except BaseException as error:
+            future.set_exception(error)
+
+    threading.Thread(target=call, name="plan", daemon=True).start()
+    while not future.done():
+        yield
+    return future.result()

@@ -40,6 +40,8 @@ class Tracking:
         """Index of the first sample of the drive, once the driver has reported it."""
         self.newest_error: float | None = None
         """Wanted − measured displacement of the newest received sample of the path [m]; None before the first."""
+        self.received = 0
+        """Number of samples of the drive that have arrived; those that came twice count twice."""
         self._squares, self._count = 0.0, 0
         self._measured = np.full(plan.voltage.size, np.nan)
         self._early: list[SampleBlock] = []
@@ -64,6 +66,7 @@ class Tracking:
         begin = (int(block.index[0]) - self.first + 2**31) % 2**32 - 2**31
         a, b = max(begin, 0), min(begin + block.size, self._measured.size)
         if b > a:
+            self.received += b - a
             measured, known = block.displacement[a - begin : b - begin], self._measured[a:b]
             self._count_errors(a, np.where(np.isnan(known), measured, np.nan))
             known[:] = measured

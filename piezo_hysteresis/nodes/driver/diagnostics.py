@@ -30,6 +30,11 @@ from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
 
 
+def status_name(driver: str) -> str:
+    """Name of the status of the driver with this full name."""
+    return f"{driver.lstrip('/')}: stage"
+
+
 class DriverDiagnostics:
     """Publishes the state, the rate and the losses once a second, and every change of state immediately.
 
@@ -50,7 +55,7 @@ class DriverDiagnostics:
 
     def __init__(self, node: GuardedNode, latch: StopLatch) -> None:
         self._node, self._latch = node, latch
-        self._name = f"{node.get_fully_qualified_name().lstrip('/')}: stage"
+        self._name = status_name(node.get_fully_qualified_name())
         self._publisher = advertise(node, DIAGNOSTICS)
         self._state = (DiagnosticStatus.STALE, "not configured", "")
         self._acquisition: StreamingAcquisition | None = None

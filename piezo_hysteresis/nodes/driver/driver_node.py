@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -101,19 +102,20 @@ class DriverNode(GuardedNode, LifecycleNode):
             values = read(self, BACK_ENDS[settings.stage].rows, f"{settings.stage}.")
             place = f"{self.resolve_topic_name('samples')} of domain {self.context.get_domain_id()}"
             session = DriverSession(settings, values, place, _records, self._latch)
-            try:
+            with ExitStack() as undo:
+                undo.callback(session.close)
                 refuse_second_driver(self, settings.discovery_time)
                 name = session.limits.name
-                self._topics = DriverTopics(self, name, frame, session.sample_period, settings.live_rate)
-            except Exception:
-                session.close()
-                raise
+                topics = DriverTopics(self, name, frame, session.sample_period, settings.live_rate)
+                undo.callback(topics.destroy)
+                undo.callback(self._clear_in_force)
+                self._publish_in_force(session.in_force())
+                undo.pop_all()
         except Exception as error:  # rclpy would end the transition without a message
             self._report_failure(error)
             return TransitionCallbackReturn.FAILURE
-        self._publish_in_force(session.in_force())
-        self._session = session
-        self._commands.attach(session, self._topics)
+        self._session, self._topics = session, topics
+        self._commands.attach(session, topics)
         self._diagnostics.state(DiagnosticStatus.OK, "configured, not active", name)
         self.get_logger().info(f"configured: {name}, {1 / session.sample_period:g} samples per second")
         for notice in session.notices:
@@ -128,6 +130,7 @@ class DriverNode(GuardedNode, LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         done = super().on_activate(state)
         self._failure = None
+        topics.restart()
         try:
             acquisition = session.start(
                 lambda: now(self), topics.deliver, lambda error: self._fail(session, error), lambda: topics.subscribers
@@ -182,7 +185,7 @@ class DriverNode(GuardedNode, LifecycleNode):
         """Release the stage at its safe voltage, and after it the publishers, which report until then."""
         self._commands.detach()
         self._diagnostics.watch(None)
-        self._publish_in_force({row.name: row.value for row in IN_FORCE} | {"stopped": self._latch.is_set})
+        self._clear_in_force()
         session, self._session = self._session, None
         topics, self._topics = self._topics, None
         if session is not None:
@@ -221,8 +224,13 @@ class DriverNode(GuardedNode, LifecycleNode):
 
     def _publish_in_force(self, values: Mapping[str, object]) -> None:
         self._in_force_changes = True
-        self.set_parameters([Parameter(f"in_force.{name}", value=value) for name, value in values.items()])
-        self._in_force_changes = False
+        try:
+            self.set_parameters([Parameter(f"in_force.{name}", value=value) for name, value in values.items()])
+        finally:
+            self._in_force_changes = False
+
+    def _clear_in_force(self) -> None:
+        self._publish_in_force({row.name: row.value for row in IN_FORCE} | {"stopped": self._latch.is_set})
 
     def _refuse_while_configured(self, parameters: list[Parameter]) -> SetParametersResult:
         """Refuse changes that would have no effect, because the parameters are read at configure."""
@@ -232,11 +240,8 @@ class DriverNode(GuardedNode, LifecycleNode):
             if name == _SIMULATED_TIME:
                 reason = f"{name}: {_OWN_CLOCK}"
             elif name.startswith("in_force."):
-                reason = (
-                    ""
-                    if self._in_force_changes
-                    else f"{name} is read only; set {name.removeprefix('in_force.')} instead"
-                )
+                own = name.removeprefix("in_force.")
+                reason = "" if self._in_force_changes else f"{name} is read only; set {own} instead"
             elif self._session is not None and (name in ours or name.split(".")[0] in BACK_ENDS):
                 reason = (
                     f"{name} is read when the driver is configured; deactivate and clean up the driver, set it, "

@@ -57,8 +57,7 @@ class DriverTopics:
     def __init__(self, node: LifecycleNode, stage: str, frame: str, sample_period: float, live_rate: float) -> None:
         self._stage, self.frame = stage, frame
         self._live_step = max(1, round(1 / (live_rate * sample_period)))
-        self._next_live = 0
-        self._first: dict[int, int] = {}
+        self.restart()
         self._writer = SampleWriter()
         self._samples = advertise_lifecycle(node, "samples")
         self._voltage = advertise_lifecycle(node, "voltage")
@@ -72,6 +71,11 @@ class DriverTopics:
     def subscribers(self) -> int:
         """Matched subscribers of `samples`."""
         return int(self._samples.get_subscription_count())
+
+    def restart(self) -> None:
+        """Begin with a new acquisition, whose samples and phases are counted from 0 again."""
+        self._next_live = 0
+        self._first: dict[int, int] = {}
 
     def destroy(self) -> None:
         """Remove the publishers, after the last status has arrived."""

@@ -20,12 +20,13 @@ import threading
 from collections.abc import Callable
 
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from ...errors import PiezoError
 from ..runtime.companion_node import companion_node
+from ..runtime.executor import spin_until
+from ..runtime.guarded_node import GuardedNode
 
 SUFFIX = "_stop"
 """Suffix that makes the name of the stop node from the name of the driver."""
@@ -38,23 +39,22 @@ class StopServices:
 
     Parameters
     ----------
-    driver : rclpy.node.Node
-        The driver.
+    driver : GuardedNode
+        The driver. It reports the faults of this thread, for example an answer that cannot be sent.
     **actions : callable
         For the last word of each service name, the function that is called in this thread. It returns the message of
         the answer.
     """
 
-    def __init__(self, driver: Node, **actions: Callable[[], str]) -> None:
+    def __init__(self, driver: GuardedNode, **actions: Callable[[], str]) -> None:
         self._node = companion_node(driver, SUFFIX)
         for word, action in actions.items():
             self._node.create_service(Trigger, f"{driver.get_fully_qualified_name()}/{word}", _answering(action))
         self._executor = SingleThreadedExecutor(context=driver.context)
         self._executor.add_node(self._node)
         self._ended = Future()
-        self._thread = threading.Thread(
-            target=self._executor.spin_until_future_complete, args=(self._ended,), name="stop", daemon=True
-        )
+        served = (self._executor, self._ended, driver)
+        self._thread = threading.Thread(target=spin_until, args=served, name="stop", daemon=True)
         self._thread.start()
 
     def end(self) -> None:

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter as RosParameter
@@ -26,7 +25,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from ...acquisition.sample_block import SampleBlock
-from ...errors import ModelError, PiezoError, RecordError
+from ...errors import PiezoError, RecordError
 from ...model.model import Model
 from ...model.model_file import load, loads
 from ...model.model_parameters import model_hash
@@ -46,6 +45,7 @@ from .diagnostics import ModelDiagnostics
 from .publishers import ModelTopics
 from .recalibrator import Recalibrator
 from .residual_alarm import ALARM, ResidualAlarm
+from .stream_period import TOLERANCE, StreamPeriod
 
 _SOURCE = "model node"
 """Source of the parameters of the model node."""
@@ -70,7 +70,7 @@ class ModelNode(GuardedNode):
         compile_kernels(self.get_logger().info)
         self._model: Model | None = None
         self._predictor: Predictor | None = None
-        self._before: SampleBlock | None = None
+        self._period = StreamPeriod()
         self._reader = SampleReader()
         self._topics = ModelTopics(self)
         self._changes = ChangeReporter(self, self._values)
@@ -111,16 +111,10 @@ class ModelNode(GuardedNode):
 
     def _predictor_for(self, block: SampleBlock) -> Predictor | None:
         """The predictor of the stream. Another sample period gives a new one; None while it is unknown."""
-        before, self._before = self._before, block
-        period = block.sample_period
-        if period is None and before is not None:
-            steps = (int(block.index[0]) - int(before.index[-1])) % 2**32
-            elapsed = (block.stamp - before.stamp) * 1e-9 - float(before.time[-1])
-            period = elapsed / steps if steps else None
-        present = self._predictor
-        if period is None or not period > 0:
+        period, present = self._period.of(block), self._predictor
+        if period is None:
             return present
-        if present is None or abs(period / present.sample_period - 1.0) > 0.01:
+        if present is None or abs(period / present.sample_period - 1.0) > TOLERANCE:
             self._predictor = Predictor(round_period(period, 1e-6), rms_time=self._values["rms_time"])
             self._diagnostics.follow(self._predictor)
             if self._model is not None:
@@ -148,7 +142,7 @@ class ModelNode(GuardedNode):
 
     def _load(self, path: str) -> None:
         try:
-            self._follow(_read(path))
+            self._follow(load(path))
         except PiezoError as error:
             self._diagnostics.refused(f"model_file: {error}")
 
@@ -174,7 +168,7 @@ class ModelNode(GuardedNode):
         try:
             for parameter in parameters:
                 if parameter.name == "model_file":
-                    _read(str(rows[parameter.name].check(parameter.value)))
+                    load(str(rows[parameter.name].check(parameter.value)))
                 elif parameter.name in rows:
                     raise RecordError(f"{parameter.name} is read at start; give it then")
         except PiezoError as error:
@@ -185,14 +179,6 @@ class ModelNode(GuardedNode):
         for parameter in parameters:
             if parameter.name == "model_file":
                 self._load(parameter.value)
-
-
-def _read(path: str) -> Model:
-    """Read the model of a file. A pipe or a device is refused, because the node would wait for it."""
-    place = Path(path).expanduser()
-    if place.exists() and not place.is_file():
-        raise ModelError(f"{path}: got no regular file, expected a model file")
-    return load(place)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

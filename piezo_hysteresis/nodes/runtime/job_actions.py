@@ -20,6 +20,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
@@ -29,11 +30,13 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
+from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from ...errors import reason_of
 from ..messages.conversions import values_of
 from .companion_node import companion_node
+from .executor import spin_until
 from .guarded_node import GuardedNode
 
 INTERFACES = "piezo_hysteresis_interfaces"
@@ -47,6 +50,8 @@ SUFFIX = "_actions"
 
 _EARLY = 0.01
 """Time between two checks whether the main node spins [s]."""
+_CHECK_INTERVAL = 0.1
+"""Time between two checks of a waiting goal whether the node ends [s]."""
 
 
 class JobActions:
@@ -79,6 +84,7 @@ class JobActions:
     ) -> None:
         self._main, self._begin, self._abort, self._ended, self._result = node, begin, abort, ended, result
         self._goal: queue.SimpleQueue[Any] | None = None
+        self._is_over = Future()
         self._executor: MultiThreadedExecutor | None = None
         if find_spec(INTERFACES) is None:
             return
@@ -96,7 +102,8 @@ class JobActions:
             )
         self._executor = MultiThreadedExecutor(num_threads=3, context=node.context)
         self._executor.add_node(self._node)
-        threading.Thread(target=self._executor.spin, name="actions", daemon=True).start()
+        served = (self._executor, self._is_over, node)
+        threading.Thread(target=spin_until, args=served, name="actions", daemon=True).start()
 
     def report(self, status: DiagnosticStatus) -> None:
         """Pass a status of the running job to the goal that began it."""
@@ -111,9 +118,9 @@ class JobActions:
 
         A thread that continues to wait would keep the process from ending.
         """
-        goal, self._goal = self._goal, None
-        if goal is not None:
-            goal.put(Trigger.Response(message=f"{self._main.get_name()} ends"))
+        if not self._is_over.done():
+            self._is_over.set_result(None)
+        self._goal = None
         executor, self._executor = self._executor, None
         if executor is not None:
             executor.shutdown(timeout_sec=1.0)
@@ -124,7 +131,7 @@ class JobActions:
         reports: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._in_main(lambda: self._start(name, handle.request, reports))
         while True:
-            report = reports.get()
+            report = self._next_of(reports)
             if isinstance(report, Trigger.Response):
                 handle.abort()
                 return kind.Result(success=False, message=report.message)
@@ -142,6 +149,13 @@ class JobActions:
         result = _filled(kind.Result, {**values, **(self._result() if done else {})})
         result.success, result.message = done, report.message
         return result
+
+    def _next_of(self, reports: queue.SimpleQueue[Any]) -> Any:
+        """Wait for the next report of a job, which never comes where the node ends before the job has begun."""
+        while not self._is_over.done():
+            with suppress(queue.Empty):
+                return reports.get(timeout=_CHECK_INTERVAL)
+        return Trigger.Response(message=f"{self._main.get_name()} ends")
 
     def _start(self, name: str, goal: Any, reports: queue.SimpleQueue[Any]) -> None:
         try:
@@ -161,7 +175,7 @@ class JobActions:
     def _in_main(self, action: Callable[[], object]) -> None:
         """Call `action` in the thread of the main node, which may not spin yet where a goal arrives early."""
         while (executor := self._main.executor) is None:
-            if not self._main.context.ok():
+            if self._is_over.done() or not self._main.context.ok():
                 return
             time.sleep(_EARLY)
         executor.create_task(self._main.guarded(action))

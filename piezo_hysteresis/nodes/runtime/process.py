@@ -42,6 +42,7 @@ _BAD_START = (
     InvalidParameterValueException,
     PiezoError,
     rclpy_implementation.RCLError,
+    rclpy_implementation.UnknownROSArgsError,
 )
 """Exceptions that rclpy raises on wrong parameters or arguments."""
 

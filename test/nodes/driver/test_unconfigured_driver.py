@@ -12,10 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a driver answers that never reached its stage: nothing about the stage."""
+"""What a driver without a stage answers and leaves behind: nothing about a stage."""
+
+import os
+from dataclasses import replace
 
 import pytest
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from std_srvs.srv import Trigger
+
+from piezo_hysteresis.nodes.driver import driver_node
+from piezo_hysteresis.nodes.driver.driver_node import DriverNode
+from piezo_hysteresis.stage import back_ends
+from piezo_hysteresis.stage.opening import BackEnd
+
+from ...acquisition.witness import Witness
 
 pytestmark = pytest.mark.nodes
 
@@ -28,3 +39,54 @@ def test_a_driver_that_does_not_know_its_stage_does_not_say_that_it_is_safe(lab)
         assert "does not know its stage" in answer.message
         assert "safe" not in answer.message
     assert "nothing moves until ~/release" in stopped.message
+
+
+@pytest.mark.parametrize("failing", ["in_force.", "topics"])
+def test_a_driver_that_cannot_be_configured_closes_its_stage(lab, monkeypatch, failing):
+    """The middleware fails once, while limits or topics are published."""
+    stages = [OwnWitness(1e-3, 100.0), OwnWitness(1e-3, 100.0)]
+    opened = iter(stages)
+    monkeypatch.setitem(back_ends.BACK_ENDS, "simulated", BackEnd("simulated", (), lambda *_: next(opened), True))
+    node = lab.add(DriverNode, discovery_time=0.0, autostart=False)
+    with monkeypatch.context() as patched:
+        if failing == "topics":
+            patched.setattr(driver_node, "DriverTopics", fail)
+        else:
+            events = node._parameter_event_publisher
+            patched.setattr(node, "_parameter_event_publisher", FailsOnce(events, failing))
+        assert not lab.transition("configure")
+    assert stages[0].closed == 1
+    assert node.get_parameter("in_force.sample_period").value == 0.0
+    assert node.count_publishers("samples") == 0
+    assert "cannot publish" in node._diagnostics._state[1]
+    assert lab.transition("configure")
+    assert lab.transition("activate")
+    lab.streaming()
+
+
+class OwnWitness(Witness):
+    """A stage of this process alone."""
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.description = replace(self.description, name=f"witness {os.getpid()}")  # tests may run side by side
+
+
+def fail(*arguments):
+    raise rclpy_implementation.RCLError("cannot publish")
+
+
+class FailsOnce:
+    """A publisher of parameter events that fails at the first parameter of a group."""
+
+    def __init__(self, publisher, group):
+        self._publisher, self._group = publisher, group
+
+    def __getattr__(self, name):
+        return getattr(self._publisher, name)
+
+    def publish(self, message):
+        if self._group and any(parameter.name.startswith(self._group) for parameter in message.changed_parameters):
+            self._group = ""
+            fail()
+        self._publisher.publish(message)

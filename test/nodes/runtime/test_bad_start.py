@@ -1,0 +1,38 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A node that cannot start says why in one line, and its exit status is 2."""
+
+import os
+
+import pytest
+
+pytestmark = pytest.mark.nodes
+
+
+@pytest.mark.parametrize(
+    ("executable", "arguments", "reason"),
+    [
+        ("driver_node", ["--bogus"], "--bogus"),
+        ("compensation_node", ["-p", "model_file:=pipe"], "expected a regular file"),
+    ],
+    ids=["unknown argument", "pipe as model file"],
+)
+def test_a_bad_argument_is_refused_in_one_line(lab, monkeypatch, executable, arguments, reason):
+    os.mkfifo(lab.folder / "pipe")
+    monkeypatch.chdir(lab.folder)
+    node = lab.start(executable, *arguments, fresh=True)
+    assert node.wait() == 2
+    (line,) = (line for line in node.output.splitlines() if "compiling kernels" not in line)
+    assert reason in line
