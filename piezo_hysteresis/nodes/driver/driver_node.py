@@ -105,8 +105,7 @@ class DriverNode(GuardedNode, LifecycleNode):
             with ExitStack() as undo:
                 undo.callback(session.close)
                 refuse_second_driver(self, settings.discovery_time)
-                name = session.limits.name
-                topics = DriverTopics(self, name, frame, session.sample_period, settings.live_rate)
+                topics = DriverTopics(self, session.limits.name, frame, session.sample_period, settings.live_rate)
                 undo.callback(topics.destroy)
                 undo.callback(self._clear_in_force)
                 self._publish_in_force(session.in_force())
@@ -116,8 +115,8 @@ class DriverNode(GuardedNode, LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         self._session, self._topics = session, topics
         self._commands.attach(session, topics)
-        self._diagnostics.state(DiagnosticStatus.OK, "configured, not active", name)
-        self.get_logger().info(f"configured: {name}, {1 / session.sample_period:g} samples per second")
+        self._diagnostics.state(DiagnosticStatus.OK, "configured, not active", session.limits.name)
+        self.get_logger().info(f"configured: {session.limits.name}, {1 / session.sample_period:g} samples per second")
         for notice in session.notices:
             self.get_logger().warning(notice)
         return super().on_configure(state)
@@ -182,15 +181,13 @@ class DriverNode(GuardedNode, LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
     def _release(self) -> None:
-        """Release the stage at its safe voltage, and after it the publishers, which report until then."""
         self._commands.detach()
         self._diagnostics.watch(None)
-        self._clear_in_force()
         session, self._session = self._session, None
         topics, self._topics = self._topics, None
-        if session is not None:
+        for end in (self._clear_in_force, *((session.close,) if session is not None else ())):
             try:
-                session.close()
+                end()
             except Exception as error:
                 self._report_failure(error)
         if topics is not None:
