@@ -116,8 +116,7 @@ def test_pieces_of_any_size_come_to_the_same_as_all_at_once(sizes, average, star
     kept = values[start:stop]
     assert taken.rows == len(values)
     if average is None:
-        assert taken.factor == max(1, 2 ** int(np.ceil(np.log2(max(1, len(kept)) / 16.0)))) or len(kept) % 16
-        assert len(kept) // taken.factor <= 16
+        assert taken.factor == next(f for f in 2 ** np.arange(20) if len(kept) // f <= 16)
     means = kept[: len(kept) // taken.factor * taken.factor].reshape(-1, taken.factor, 2).mean(axis=1)
     if len(means):
         np.testing.assert_allclose(np.stack((taken.column(0), taken.column(1)), axis=1), means, atol=1e-12)
