@@ -15,7 +15,8 @@
 """Kernels that compute the normalised drive v at which the hysteresis output w has a wanted value.
 
 w(v) = p1 v³ + p2 v + p_e v² + p_4 v⁴ + h(v) + Σ_j c_j f_j(p_j) with the plays p_j(v) and f_j of `level_density`; c, a,
-b and q are the rows of one array. h is computed by the kernels of the model, so the root agrees with it up to rounding.
+b and q are the rows of one array, c alone if f_j(p) = p. h is computed by the kernels of the model, so the root agrees
+with it up to rounding.
 If ∂h/∂v is known in closed form, Newton's method is used. Otherwise, or if Newton's method leaves the range or does not
 converge, one Newton step is followed by the secant method inside a bracket.
 """
@@ -28,7 +29,7 @@ from ..blocks.bouc_wen_kernel import BETA, GAMMA, A, general_step, plain_step
 from ..blocks.kernel import fma, inlined
 from ..effects.hysteresis.level_density import level_density, level_value
 from ..effects.hysteresis.published_bouc_wen import step as published_step
-from ..inverse_terms import GENERAL, NO_LOOP, PLAIN, PUBLISHED
+from ..inverse_terms import GENERAL, NO_LOOP, PLAIN
 
 P1, P2, SQUARE, FOURTH = range(4)
 """Coefficients of the static polynomial in the order of `POLYNOMIAL`: of v³, v, v² and v⁴."""
@@ -65,7 +66,7 @@ def plays_end(c, radii, plays, v):
     total = 0.0
     for j in range(radii.size):
         p = max(v - radii[j], min(v + radii[j], plays[j]))
-        total += c[0, j] * level_value(p, c[1, j], c[2, j], c[3, j])
+        total += c[0, j] * (level_value(p, c[1, j], c[2, j], c[3, j]) if len(c) > 1 else p)
     return total
 
 
@@ -87,7 +88,8 @@ def slope_at(kind, p, poly, c, radii, h, v, plays, s):
         slope += p[A] - (p[BETA] * s + p[GAMMA] * copysign(1.0, h)) * h
     for j in range(radii.size):
         if s * (v - plays[j]) >= radii[j] * (1.0 - 1e-9):
-            slope += c[0, j] * level_density(v - s * radii[j], c[1, j], c[2, j], c[3, j])
+            held = v - s * radii[j]
+            slope += c[0, j] * (level_density(held, c[1, j], c[2, j], c[3, j]) if len(c) > 1 else 1.0)
     return slope
 
 
@@ -142,121 +144,3 @@ def solve(kind, p, periods, poly, c, radii, h, last, plays, wanted, now, orienta
             following = 0.5 * (near + far) if closed else x + 4.0 * (x - last)
         x = following
     return best
-
-
-LOOP_END_IN_C = {
-    NO_LOOP: f"enum {{ NEWTON = {NEWTON} }};\n#define LOOP_END(p, h, dv) (h)\n",
-    PLAIN: f"enum {{ NEWTON = {NEWTON} }};\n#define LOOP_END(p, h, dv) plain_step(h, dv, p[0], p[1], p[2])\n",
-    GENERAL: "enum { NEWTON = 0 };\n#define LOOP_END(p, h, dv) general_step(h, dv, p, p[8], p[9])\n",
-    PUBLISHED: "enum { NEWTON = 0 };\n#define LOOP_END(p, h, dv) published_step(h, dv, p[0], p[1], p[2], p[3])\n",
-}
-"""C code of `loop_end` for every kind of loop; p contains its parameters and then both periods."""
-SOLVE_IN_C = (
-    f"""\
-static const double ROUNDING = {ROUNDING!r};
-enum {{ MOST = {MOST} }};
-
-"""
-    """\
-/* A hysteresis before a sample: loop, polynomial p1, p2, p_e, p_4, plays. */
-typedef struct {
-    const double *p, *poly, *c, *a, *b, *q, *radius, *play;
-    int plays;
-    double h, v;
-} hysteresis_before;
-
-/* h after the loop has gone to v. */
-static double loop_end(const hysteresis_before *b, double v)
-{
-    return v == b->v ? b->h : LOOP_END(b->p, b->h, v - b->v);
-}
-
-/* w at v without the loop. */
-static double without_loop(const hysteresis_before *b, double v)
-{
-    const double *poly = b->poly, square = v * v;
-    double total = 0.0;
-    int j;
-    for (j = 0; j < b->plays; j++) {
-        const double p = larger(v - b->radius[j], smaller(v + b->radius[j], b->play[j]));
-        total += b->c[j] * level_value(p, b->a[j], b->b[j], b->q[j]);
-    }
-    return FMA(FMA(poly[0], square, poly[1]), v, FMA(poly[3], square, poly[2]) * square) + total;
-}
-
-/* dw/dv for motion in the direction s from the state h. */
-static double slope_at(const hysteresis_before *b, double h, double v, double s)
-{
-    const double *poly = b->poly, square = v * v;
-    double slope = FMA(3.0 * poly[0], square, poly[1]) + 2.0 * v * FMA(2.0 * poly[3], square, poly[2]);
-    int j;
-    slope += b->p[0] - (b->p[1] * s + b->p[2] * copysign(1.0, h)) * h;
-    for (j = 0; j < b->plays; j++) {
-        if (s * (v - b->play[j]) >= b->radius[j] * (1.0 - 1e-9)) {
-            slope += b->c[j] * level_density(v - s * b->radius[j], b->a[j], b->b[j], b->q[j]);
-        }
-    }
-    return slope;
-}
-
-/* v in [low, high] with w(v) = wanted; without a solution, the end of the interval in this direction. `now` is w before
-   the sample. Newton's method is used while it stays inside, otherwise the secant method in a bracket. */
-static double solve(
-    const hysteresis_before *b, double wanted, double now, double orientation, double low, double high)
-{
-    const double last = b->v, gap = wanted - now, enough = ROUNDING * (fabs(wanted) + fabs(now));
-    const double s = copysign(1.0, gap) * orientation, edge = s > 0.0 ? larger(high, last) : smaller(low, last);
-    double slope, x, x0 = last, g, g0 = gap, near_ = last, far_ = edge, best = last, best_gap = fabs(gap);
-    int k, closed = 0;
-    if (fabs(gap) <= enough || edge == last) {
-        return last;
-    }
-    slope = slope_at(b, b->h, last, s);
-    if (slope * orientation < 0.02 * fabs(b->poly[1])) {
-        slope = orientation * larger(fabs(b->poly[1]), 1e-3);
-    }
-    x = last + gap / slope;
-    for (k = 0; k < NEWTON && s * (x - last) > 0.0 && s * (edge - x) >= 0.0; k++) {
-        const double end = loop_end(b, x);
-        g = wanted - without_loop(b, x) - end;
-        if (fabs(g) <= enough) {
-            return x;
-        }
-        x += g / slope_at(b, end, x, s);
-    }
-    x = last + gap / slope;
-    for (k = 0; k < MOST; k++) {
-        double following;
-        if (s * (x - near_) <= 0.0 || s * (far_ - x) < 0.0 || (closed && x == far_)) {
-            x = closed ? 0.5 * (near_ + far_) : far_;
-        }
-        g = wanted - (without_loop(b, x) + loop_end(b, x));
-        if (fabs(g) < best_gap) {
-            best = x;
-            best_gap = fabs(g);
-        }
-        if (fabs(g) <= enough || (g * gap > 0.0 && x == edge)) {
-            return x;
-        }
-        if (g * gap > 0.0) {
-            near_ = x;
-        } else {
-            far_ = x;
-            closed = 1;
-        }
-        if (closed && fabs(far_ - near_) <= ROUNDING * (fabs(far_) + fabs(near_))) {
-            return best;
-        }
-        following = g0 != g ? x + g * (x - x0) / (g0 - g) : far_;
-        x0 = x;
-        g0 = g;
-        if (k % 6 == 5) {
-            following = closed ? 0.5 * (near_ + far_) : x + 4.0 * (x - last);
-        }
-        x = following;
-    }
-    return best;
-}
-"""
-)
-"""C functions of `solve` and the functions that it calls."""

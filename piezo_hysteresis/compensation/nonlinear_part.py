@@ -32,6 +32,7 @@ from ..effects.hysteresis.level_density import DENSITY_IN_C, VALUE_IN_C
 from ..errors import ModelError
 from ..inverse_terms import NO_LOOP, POLYNOMIAL, InverseTerms, LoopTerms, PlayTerms, RelaxationTerms
 from . import hysteresis_solver as solver
+from . import hysteresis_solver_c as solver_c
 from . import recursion as r
 from .limits import Limits
 
@@ -79,8 +80,7 @@ class NonlinearPart:
         self.periods = self._loop.periods or (sample_period, sample_period)
         self._plays = hysteresis.plays or PlayTerms(np.zeros(0), np.zeros(0))
         c, self.radii = self._plays.weights, self._plays.radii
-        root = np.outer((1.0, 0.0, 0.0), np.ones(c.size)) if self._plays.root is None else self._plays.root
-        self.weights = np.vstack((c, root))
+        self.weights = c[None] if self._plays.root is None else np.vstack((c, self._plays.root))
         self._bracket(drive)
         self.drive = tuple(drive.tolist())
         self._relaxations = [t.relaxations for t in terms if t.relaxations is not None]
@@ -89,9 +89,9 @@ class NonlinearPart:
     def _bracket(self, d: Array) -> None:
         """Set in `d` the interval of the search for roots: between extrema of the static curve, inside the limits."""
         p1, p2, square, fourth = self.poly
-        c, a, b, q = self.weights
-        plays = [c @ (a * a), 2.0 * c @ (a * b), c @ (b * b + 2.0 * a * q), 2.0 * c @ (b * q), c @ (q * q)]
-        slope = np.array([p2, 2.0 * square, 3.0 * p1, 4.0 * fourth, 0.0]) + plays
+        c, a, b, q = (*self.weights, 1.0, 0.0, 0.0)[:4]
+        density = (a * a, 2.0 * a * b, b * b + 2.0 * a * q, 2.0 * b * q, q * q)
+        slope = np.array([p2, 2.0 * square, 3.0 * p1, 4.0 * fourth, 0.0]) + [np.sum(c * d) for d in density]
         if slope[0] == 0.0:
             raise ModelError("hysteresis: the static curve has no slope at 0 V; expected p2 or plays")
         d[r.TURN] = np.sign(slope[0])
@@ -133,14 +133,15 @@ class NonlinearPart:
 
     def c_form(self) -> CForm:
         """The recursion as C code: its ``rest`` takes the drive voltage, its ``step`` the wanted output."""
-        one_at_least = (0, max(0, 1 - self.radii.size))  # C has no empty arrays
         numbers: dict[str, Number] = {
             "h0": self._loop.initial,
             "virgin": self._plays.virgin,
             "PLAYS": self.radii.size,
         }
-        plays = (*zip(("c", "a", "b_", "q"), self.weights, strict=True), ("radius", self.radii))
-        numbers |= {name: np.pad(values, one_at_least) for name, values in plays}
+        root = self.weights[1:].ravel()
+        plays = {"c": self.weights[0], "root": root, "radius": self.radii}
+        # C has no empty arrays
+        numbers |= {name: values if values.size else np.zeros(1) for name, values in plays.items()}
         numbers |= {"loop": np.array(self.loop + self.periods), "poly": np.array(self.poly)}
         numbers |= dict(zip(r.DRIVE, self.drive, strict=True))
         state = ["double voltage, slewed, pole, held, pushed", "double h, v, w"]
@@ -160,8 +161,9 @@ class NonlinearPart:
             before.insert(0, r.BEFORE_IN_C.replace("BANK", str(b)))
             rest.append(r.SETTLED_IN_C.replace("BANK", str(b)))
             after.append(r.AFTER_IN_C.replace("BANK", str(b)))
-        loop = (*self._loop.library, RAMP, solver.LOOP_END_IN_C[self.kind])
-        library = (*loop, VALUE_IN_C, DENSITY_IN_C, solver.SOLVE_IN_C, r.AMPLIFIER_IN_C)
+        loop = (*self._loop.library, RAMP, solver_c.LOOP_END_IN_C[self.kind])
+        play = (VALUE_IN_C, DENSITY_IN_C, solver_c.LEVEL_PLAYS_IN_C) if root.size else (solver_c.PLAYS_IN_C,)
+        library = (*loop, *play, solver_c.SOLVE_IN_C, r.AMPLIFIER_IN_C)
         step = "".join((*before, r.DRIVE_IN_C, *after, "return u;"))
         return CForm(step, "".join((*rest, "return w;")), numbers, tuple(state), library)
 

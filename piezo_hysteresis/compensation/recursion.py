@@ -188,13 +188,13 @@ for (j = 0; j < PLAYS; j++) {
     s->play[j] = s->v - virgin * smaller(larger(s->v, -radius[j]), radius[j]);
 }
 {
-    const hysteresis_before b = { loop, poly, c, a, b_, q, radius, s->play, PLAYS, s->h, s->v };
+    const hysteresis_before b = { loop, poly, c, root, radius, s->play, PLAYS, s->h, s->v };
     w = s->w = without_loop(&b, s->v) + s->h;
 }
 """
 """C code of the state at rest, without the banks."""
 DRIVE_IN_C = """\
-const hysteresis_before b = { loop, poly, c, a, b_, q, radius, s->play, PLAYS, s->h, s->v };
+const hysteresis_before b = { loop, poly, c, root, radius, s->play, PLAYS, s->h, s->v };
 double v = solve(&b, x, s->w, turn, low, high) / per_volt, u, w, before;
 int j;
 /* the drive voltage, inside the limits, for a voltage v after the play */
