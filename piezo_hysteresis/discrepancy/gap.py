@@ -23,11 +23,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..identification.fit.normal_equations import Nuisance, residuals
-from ..identification.records.conditioning import with_conditioning
+from ..identification.fit.normal_equations import Nuisance
 from ..model.model import Model
 from ..model.provenance import free_run
 from ..record import Record
+from .residual.residual import residuals_on
 from .search.cross_validation import ADEQUATE
 from .search.selection_result import explained
 
@@ -135,11 +135,10 @@ def measure_gap(
     DivergenceError
         If a model diverges on one of the chosen records, or on one that it continues.
     """
-    kept = with_conditioning(records, chosen)
 
     def left_by(model: Model, nuisance: Nuisance) -> list[float]:
-        left = dict(zip(kept, residuals(model, [records[i] for i in kept], nuisance), strict=True))
-        return [100.0 * float(np.sqrt(np.mean(left[i] ** 2))) / stroke for i in chosen]
+        left = residuals_on(model, records, chosen, nuisance)
+        return [100.0 * float(np.sqrt(np.mean(e**2))) / stroke for e in left]
 
     rows = [left_by(model, nuisance) for model, nuisance in zip(models, nuisances, strict=True)]
     before, after = np.array(rows[0]), np.array(rows[1])

@@ -229,13 +229,18 @@ def test_a_fault_in_mid_waveform(wired, word, fault):
     check_wire(s.wire)
 
 
+def leave_at(word, emulated, voltage):
+    """A program that has ended has left the output there."""
+    if word == "gcs2":
+        emulated.carry_out(f"SVA 1 {voltage * GAIN}")
+    else:
+        emulated.set(voltage)
+
+
 @pytest.mark.parametrize("word", ["gcs2", "nidaqmx"])
 def test_the_next_start_at_a_voltage_that_a_killed_driver_has_left(word):
     with device(word) as (name, parameters, amplifier, (emulated, _)):
-        if word == "gcs2":
-            emulated.carry_out(f"SVA 1 {TOP * GAIN}")
-        else:
-            emulated.set(TOP)
+        leave_at(word, emulated, TOP)
         since = len(amplifier.parts)
         s = WiredSession(name, parameters, amplifier)
         opened = np.concatenate([np.full(1, TOP), *amplifier.parts[since:]])
@@ -252,10 +257,7 @@ def test_the_next_start_at_a_voltage_that_a_killed_driver_has_left(word):
 def test_a_stage_that_was_left_outside_the_limits_of_the_driver_is_first_made_safe(word):
     left = TOP + 2.0
     with device(word) as (name, parameters, amplifier, (emulated, _)):
-        if word == "gcs2":
-            emulated.carry_out(f"SVA 1 {left * GAIN}")
-        else:
-            emulated.set(left)
+        leave_at(word, emulated, left)
         since = len(amplifier.parts)
         s = WiredSession(name, parameters, amplifier, voltage_max=TOP)
         assert np.ptp(np.concatenate([np.full(1, left), *amplifier.parts[since:]])) <= LSB, "opening moves nothing"

@@ -23,10 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...identification.fit.normal_equations import Nuisance
-from ...identification.fit.normal_equations import residuals as residuals_of
-from ...identification.records.conditioning import with_conditioning
 from ...model.model import Model
 from ...record import Record
+from .residual import residuals_on
 
 Array = NDArray[np.float64]
 Bins = NDArray[np.intp]
@@ -84,9 +83,8 @@ def located(
     DivergenceError
         If the model diverges.
     """
-    kept = with_conditioning(records, used)
-    left = dict(zip(kept, residuals_of(model, [records[i] for i in kept], nuisance), strict=True))
-    return localise([records[i] for i in used], [left[i] for i in used], [floors[i] for i in used])
+    left = residuals_on(model, records, used, nuisance)
+    return localise([records[i] for i in used], left, [floors[i] for i in used])
 
 
 def localise(

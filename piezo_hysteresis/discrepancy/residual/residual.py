@@ -21,6 +21,7 @@ of the measured displacement over the whole experiment. The paper's Table 1 uses
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,7 +29,8 @@ from numpy.typing import NDArray
 
 from ...effects import MainsHum
 from ...errors import RecordError
-from ...identification.fit.normal_equations import Nuisance
+from ...identification.fit.normal_equations import Nuisance, residuals
+from ...identification.records.conditioning import with_conditioning
 from ...model.model import Model
 from ...record import CONDITIONING, Experiment, Record
 from .noise_floor import stroke
@@ -225,3 +227,27 @@ def _row(index: int, record: Record, residual: Array, span: float) -> Error:
         fit=100.0 * (1.0 - rms / deviation) if deviation > 0.0 else float("nan"),
         has_known_start=_has_known_start(record),
     )
+
+
+def residuals_on(model: Model, records: Sequence[Record], wanted: Sequence[int], nuisance: Nuisance) -> list[Array]:
+    """Residuals of the records `wanted` [m]; others are only simulated if one of these continues them.
+
+    Parameters
+    ----------
+    model : Model
+        Model that is simulated in free run.
+    records : sequence of Record
+        The whole experiment.
+    wanted : sequence of int
+        Indices of the records.
+    nuisance : Nuisance
+        Disturbances that are free in every record.
+
+    Raises
+    ------
+    DivergenceError
+        If the model diverges.
+    """
+    kept = with_conditioning(records, wanted)
+    left = dict(zip(kept, residuals(model, [records[i] for i in kept], nuisance), strict=True))
+    return [left[i] for i in wanted]

@@ -24,6 +24,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .piece_fit import DELAY, PieceFit
 from .pieces import Kind, RecordPiece
@@ -64,14 +65,17 @@ def without_steps(pieces: Sequence[RecordPiece]) -> list[RecordPiece]:
 
 def misfit_beside_steps(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
     """Mean square misfit of the pieces that are no steps, in floors; infinite if all are steps."""
-    steps = [p.kind is Kind.STEP for p in pieces if p.kind is not Kind.CONDITIONING]
-    weights = np.where(steps, 0.0, fit.weights)
+    weights = np.where(_are_steps(pieces), 0.0, fit.weights)
     return float(weights @ fit.squares / weights.sum()) if weights.any() else np.inf
 
 
 def lateness_of_steps(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
     """How much later than in the model the responses to the steps begin, by their slope with the delay [samples]."""
-    counted = [p for p in pieces if p.kind is not Kind.CONDITIONING]
-    steps = sum(m for m, p in zip(fit.matrices, counted, strict=True) if p.kind is Kind.STEP)
+    steps = fit.matrices[_are_steps(pieces)].sum(axis=0)
     delay = fit.names.index(DELAY)
     return float(steps[delay, -1] / steps[delay, delay])
+
+
+def _are_steps(pieces: Sequence[RecordPiece]) -> NDArray[np.bool_]:
+    """Which of the pieces that a fit counts are steps."""
+    return np.array([p.kind is Kind.STEP for p in pieces if p.kind is not Kind.CONDITIONING])
