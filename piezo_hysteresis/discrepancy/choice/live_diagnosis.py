@@ -37,7 +37,7 @@ from .update import End, Update, percent
 MOST_RIVALS = 3
 """Largest number of rivals for which a drive is chosen; with more rivals the fixed order continues."""
 DETOUR = 0.1
-"""Stage time of chosen drives before the last tier, as a share of that of all tiers; a wrong choice costs no more."""
+"""Stage time of all chosen drives, as a share of that of all tiers; wrong choices cost no more."""
 MOST_CHOSEN = 4
 """Largest number of consecutive chosen drives. If none of them decides, the prediction of their results is wrong."""
 
@@ -150,9 +150,10 @@ class LiveDiagnosis:
             return f"Stopped after {update.time:.1f} s: the probability of {likeliest} is {share}."
         if self.end is End.UNDECIDABLE and self.separation is not None:
             return f"No decision is possible within the limits and {self.longest:g} s. {self.separation.sentence()}"
+        further = "" if self.separation is None else f" {self.separation.sentence()}"
         return (
-            f"All phases that fit into {self.longest:g} s were played ({update.time:.1f} s), and no explanation is "
-            f"certain: {update.sentence()}."
+            f"All planned phases that fit into {self.longest:g} s were played ({update.time:.1f} s), and no explanation "
+            f"is certain: {update.sentence()}.{further}"
         )
 
     def answer(self) -> dict[str, Any]:
@@ -177,7 +178,7 @@ class LiveDiagnosis:
 
     @property
     def _detour_left(self) -> float:
-        """Stage time that further chosen drives may take before the last tier [s]."""
+        """Stage time that further chosen drives may take [s]."""
         spent = self.time - sum(tier.duration for tier in self.plan[: self.tier])
         return DETOUR * sum(tier.duration for tier in self.plan) - spent
 
@@ -215,7 +216,7 @@ class LiveDiagnosis:
             chosen = best_drive(rivals, drives, missing_log_odds(likely, self.error_rate), self.longest - self.time)
             if chosen is not None:
                 phases, separation = chosen
-                if separation.decides and (not left or separation.duration <= self._detour_left):
+                if separation.decides and separation.duration <= self._detour_left:
                     name = f"{separation.drive}, to separate {' from '.join(separation.rivals)}"
                     return replace(self, due=phases, due_name=name, separation=separation, chosen=self.chosen + 1)
         if left:

@@ -28,7 +28,7 @@ class End(StrEnum):
     UNDECIDABLE = "undecidable"
     """No drive within the limits and the remaining time is expected to separate the rivals."""
     EXHAUSTED = "exhausted"
-    """All phases that fit into the stage time were played, and no explanation is certain."""
+    """The planned phases that fit into the stage time were played, and no explanation is certain."""
 
 
 @dataclass(frozen=True, slots=True)
