@@ -45,7 +45,7 @@ from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate, scre
 from piezo_hysteresis.discrepancy.search.cross_validation import ADEQUATE
 from piezo_hysteresis.discrepancy.search.refit import without
 from piezo_hysteresis.discrepancy.search.selection import REFITS
-from piezo_hysteresis.discrepancy.search.test_records import reporting
+from piezo_hysteresis.discrepancy.search.test_records import choose_test_records
 from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
 from piezo_hysteresis.identification.protocol import protocol
@@ -101,7 +101,7 @@ def floor(diagnosis: Diagnosis) -> Figure:
 def roles(diagnosis: Diagnosis) -> Figure:
     """Step 2: training records and test records."""
     records = diagnosis.experiment.records
-    tests = reporting(records, used(records))
+    tests = choose_test_records(records, used(records))
     kinds = {"test record": ORANGE, "training record": BLUE, "brings the stage into its state": GREY}
     figure, ((axes,),) = canvas(1, 1, 3.4)
     for k, record in enumerate(records):

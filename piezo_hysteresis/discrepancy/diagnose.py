@@ -83,8 +83,6 @@ def diagnose(
         If `experiment` holds no records.
     IdentificationError
         If the drive does not move in any record that is compared with a model, or the displacement is constant.
-    ModelError
-        If the records are faster than the model.
     """
     if not time_limit > 0.0:
         raise ParameterError(f"diagnose: got a time limit of {time_limit:g} s, expected more than 0 s")

@@ -33,14 +33,14 @@ from .conclusion import concluded
 from .diagnosis import Conclusion, Diagnosis
 from .diagnosis_state import VOLTAGE_NOISE, DiagnosisState
 from .excitation_check import check_motion, moves
-from .residual.explicit_step import KIND, explicit_model, without_steps
+from .explicit_step import KIND, explicit_model, without_steps
 from .residual.localise import ResidualShare, located
-from .residual.sampling import NOISE_WIDTH, quieted, voltage_noise
+from .residual.sampling import NOISE_WIDTH, is_faster, quieted, resampled, voltage_noise
 from .search.baseline_setup import BaselineSetup, prepare_baseline
 from .search.cross_validation import ADEQUATE
 from .search.execution.time_limit import ending_at
 from .search.selection import select
-from .search.single_record import diagnose_few
+from .single_record import diagnose_few
 from .unnamed.correction import without_corrections
 from .verdict import FEWEST_RECORDS
 
@@ -48,6 +48,9 @@ Array = NDArray[np.float64]
 
 STEPS_LEAVE = 10.0
 """Largest cost after the subtraction of an explicit step, if it is subtracted before the search."""
+
+RESAMPLED = "resampled"
+"""Kind of the notice about records that are faster than the given model."""
 
 Pass = Callable[[DiagnosisState], DiagnosisState | Diagnosis]
 """Takes the state of the diagnosis; returns the new state, or the answer, which ends the diagnosis."""
@@ -67,7 +70,7 @@ def quiet_voltage(state: DiagnosisState) -> DiagnosisState:
     return replace(state, experiment=replace(experiment, records=records).noting(Notice(VOLTAGE_NOISE, message)))
 
 
-def carry_lead_in(state: DiagnosisState) -> DiagnosisState:
+def start_at_a_known_state(state: DiagnosisState) -> DiagnosisState:
     """Cut records that begin in an unknown state at the point where a full loop determines it, as `identify` does."""
     experiment, notices = known_from_within(state.experiment)
     return replace(state, experiment=experiment.noting(*notices)) if notices else state
@@ -90,6 +93,22 @@ def check_data(state: DiagnosisState) -> DiagnosisState | Diagnosis:
         return state
     reason = f"No verdict is possible, because of the data: {severe[0].message}."
     return Diagnosis(Conclusion.INSUFFICIENT_DATA, reason, model, model, None, None, (), None, None, experiment)
+
+
+def resample_for_the_given_model(state: DiagnosisState) -> DiagnosisState:
+    """Convert records that are faster than the given model, which holds at its sample period and at longer ones."""
+    if state.model is None:
+        return state
+    period, experiment = state.model.sample_period, state.experiment
+    fast = [r.sample_period for r in experiment if is_faster(r, period)]
+    if not fast:
+        return state
+    message = (
+        f"the given model holds from a sample period of {period:g} s on; "
+        f"records with samples every {min(fast):g} s were converted to it"
+    )
+    records = tuple(resampled(r, period) if is_faster(r, period) else r for r in experiment.records)
+    return replace(state, experiment=replace(experiment, records=records).noting(Notice(RESAMPLED, message)))
 
 
 def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosis:
@@ -149,7 +168,7 @@ def search_again_with_sharper_samples(state: DiagnosisState) -> DiagnosisState:
     """Searches once more, if time is left and the model that was found corrects averaged samples differently."""
     selection = state.searched
     extends = selection.in_time and bool(selection.accepted)
-    if not (extends and state.corrects_intersample_error and state.fitted.is_coarse(selection.model)):
+    if not (extends and state.corrects_intersample_error and state.fitted.changes_intersample_error(selection.model)):
         return state
     again = search_effects(fit_baseline(state))
     return again if again.searched.in_time else state
@@ -197,8 +216,9 @@ def conclude(state: DiagnosisState) -> Diagnosis:
 
 PASSES: tuple[Pass, ...] = (
     quiet_voltage,
-    carry_lead_in,
+    start_at_a_known_state,
     check_data,
+    resample_for_the_given_model,
     compare_with_given_model,
     answer_few_records,
     fit_baseline,

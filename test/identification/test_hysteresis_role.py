@@ -64,7 +64,7 @@ ORDINARY = {"offset"}
 OTHER_MEANINGS = {("report/figures/creep.py", "creep")}  # the name of the figure
 ABOUT_ONE_OPERATOR = {
     "cli/model/identify.py",  # its option --published means the published operator
-    "discrepancy/residual/explicit_step.py",  # recognises the step of Eq. (7)
+    "discrepancy/explicit_step.py",  # recognises the step of Eq. (7)
 }
 LIMITS = DriveLimits(sample_period=2e-4)
 

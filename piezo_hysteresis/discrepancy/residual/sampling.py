@@ -172,9 +172,39 @@ def common_period(records: Sequence[Record]) -> float:
     return min(broadband or [r.sample_period for r in records])
 
 
+def is_faster(record: Record, period: float) -> bool:
+    """Whether the record has a shorter sample period than `period` [s]."""
+    return record.sample_period < 0.999 * period
+
+
+def resampled(record: Record, period: float) -> Record:
+    """The record as it would have been taken at a longer sample period [s].
+
+    Averages of both channels over the same samples would make the response earlier by half the difference of the
+    periods: a held drive acts in the middle of its sample, the displacement is measured at its beginning. So the drive
+    is averaged over every new sample, and the displacement is taken at its beginning.
+
+    Parameters
+    ----------
+    record : Record
+        Record with a shorter sample period.
+    period : float
+        The new sample period [s].
+    """
+    edges = period * np.arange(int(record.duration / period * (1.0 + 1e-12)) + 1)
+    own = record.sample_period * np.arange(record.size + 1)
+    path = record.sample_period * np.concatenate(([0.0], np.cumsum(record.voltage)))
+
+    def sampled(channel: Array) -> Array:
+        return np.asarray(scipy.interpolate.make_interp_spline(own[:-1], channel, min(3, record.size - 1))(edges[:-1]))
+
+    voltage = np.diff(np.interp(edges, own, path)) / period
+    return record.with_channels(sampled, voltage=voltage, sample_period=period, initial_voltage=record.settled_voltage)
+
+
 def at_period(record: Record, period: float) -> Record:
     """The record at `period` [s], if it is faster, or slower with a drive that excites the dynamics; or unchanged."""
-    if record.sample_period < 0.999 * period:
+    if is_faster(record, period):
         factor = round(period / record.sample_period)
         whole = abs(factor * record.sample_period - period) < 1e-3 * period and record.size >= factor
         return replace(record.decimate(factor), sample_period=period) if whole else _interpolated(record, period)

@@ -42,7 +42,7 @@ from .cross_validation import ADEQUATE, Score
 from .execution.cores import start_helpers
 from .refit import FAILURES, LAST, PRECISE, clearly_better, joint
 from .selection_result import Selection
-from .test_records import reporting
+from .test_records import choose_test_records
 from .training_data import TrainingData
 
 Array = NDArray[np.float64]
@@ -106,7 +106,7 @@ class BaselineSetup:
         """Noise of those records [m]; infinite for a record that only determines the state of the stage."""
         return np.array(select_records(self.records, self.noise.tolist(), self.fitted)[1])
 
-    def is_coarse(self, model: Model) -> bool:
+    def changes_intersample_error(self, model: Model) -> bool:
         """Whether the inter-sample error computed with this model differs by more than the floor of a record."""
         try:
             again = intersample_error(model, self.given)
@@ -140,14 +140,10 @@ def prepare_baseline(
     progress : callable
         Called with a message and the fraction done.
 
-    Raises
-    ------
-    ModelError
-        If the records are faster than the model.
     """
     progress("baseline", 0.1)
     records = tuple(slowed(r) for r in given)
-    test_records = reporting(records, usable)
+    test_records = choose_test_records(records, usable)
     fitted = [i for i in usable if i not in test_records]
     noise, span = noise_floors(records), stroke(records)
     least = floors(records, noise)

@@ -25,7 +25,7 @@ SHARE = 3
 """Number of records of a kind per test record."""
 
 
-def reporting(records: Sequence[Record], usable: Collection[int]) -> tuple[int, ...]:
+def choose_test_records(records: Sequence[Record], usable: Collection[int]) -> tuple[int, ...]:
     """Indices of the test records.
 
     If a kind of phase has at least three realisations, one in three is a test record, from the middle of the list, so

@@ -26,36 +26,36 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...effects import Effect
-from ...errors import PiezoError
-from ...identification.fit.fit import Fit, Progress
-from ...identification.fit.normal_equations import Nuisance
-from ...identification.identification import Identification
-from ...identification.identify import identify
-from ...identification.records.conditioning import with_conditioning
-from ...identification.structure.left_out import has_several_drives, score_left_out
-from ...model.model import Model
-from ...model.provenance import provenance
-from ...record import CONDITIONING, Experiment, Notice, Record
-from ..diagnosis import Conclusion, Diagnosis
-from ..excitation_check import missing_excitation
-from ..gap import Gap, measure_gap, with_stated_error
-from ..next_experiment import best_next_experiment
-from ..residual.localise import located
-from ..residual.noise_floor import floors, noise_floors, stroke
-from ..residual.sampling import shortened
-from ..verdict import FEWEST_RECORDS, MORE_MAY_BE_MISSING, conclusion_of, is_explained
-from .baseline import with_zero
-from .candidates import loop_is_off, score_model
-from .cross_validation import ADEQUATE, Score
-from .execution.cores import start_helpers
-from .execution.time_limit import ending_at
-from .record_blocks import training_data_of
-from .refit import joint
-from .selection import select
-from .selection_result import Selection, Step, explained
-from .structure_steps import structure_steps
-from .test_records import reporting
+from ..effects import Effect
+from ..errors import PiezoError
+from ..identification.fit.fit import Fit, Progress
+from ..identification.fit.normal_equations import Nuisance
+from ..identification.identification import Identification
+from ..identification.identify import identify
+from ..identification.records.conditioning import with_conditioning
+from ..identification.structure.left_out import has_several_drives, score_left_out
+from ..model.model import Model
+from ..model.provenance import provenance
+from ..record import CONDITIONING, Experiment, Notice, Record
+from .diagnosis import Conclusion, Diagnosis
+from .excitation_check import missing_excitation
+from .gap import Gap, measure_gap, with_stated_error
+from .next_experiment import best_next_experiment
+from .residual.localise import located
+from .residual.noise_floor import floors, noise_floors, stroke
+from .residual.sampling import shortened
+from .search.baseline import with_zero
+from .search.candidates import loop_is_off, score_model
+from .search.cross_validation import ADEQUATE, Score
+from .search.execution.cores import start_helpers
+from .search.execution.time_limit import ending_at
+from .search.record_blocks import training_data_of
+from .search.refit import joint
+from .search.selection import select
+from .search.selection_result import Selection, Step, explained
+from .search.structure_steps import structure_steps
+from .search.test_records import choose_test_records
+from .verdict import FEWEST_RECORDS, MORE_MAY_BE_MISSING, conclusion_of, is_explained
 
 LAST, PRECISE = 25, 1e-6
 """Largest number of linearisations of a fit, and relative decrease of the cost at convergence."""
@@ -100,7 +100,7 @@ def diagnose_few(
         Time at which the search for further effects has to end, on the clock of `time.monotonic` [s].
     """
     records = experiment.records
-    aside = reporting(records, used) if len(used) >= FEWEST_RECORDS else ()
+    aside = choose_test_records(records, used) if len(used) >= FEWEST_RECORDS else ()
     fitted = [i for i in used if i not in aside]
     known = _without(experiment, aside)
     progress("baseline", 0.1)

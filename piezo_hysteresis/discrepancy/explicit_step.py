@@ -28,16 +28,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import BoucWen
-from ...effects.hysteresis.explicit_bouc_wen import ExplicitBoucWen
-from ...identification.fit.normal_equations import grams
-from ...model.model import Model
-from ...record import Experiment, Notice, Record
-from ..search.candidates import directions, free_numbers
-from ..search.cross_validation import cross_validate
-from ..search.refit import FAILURES, joint
-from ..search.training_data import TrainingData
-from .sampling import at_period, less
+from ..effects import BoucWen
+from ..effects.hysteresis.explicit_bouc_wen import ExplicitBoucWen
+from ..identification.fit.normal_equations import grams
+from ..model.model import Model
+from ..record import Experiment, Notice, Record
+from .residual.sampling import at_period, is_faster, less
+from .search.candidates import directions, free_numbers
+from .search.cross_validation import cross_validate
+from .search.refit import FAILURES, joint
+from .search.training_data import TrainingData
 
 Array = NDArray[np.float64]
 
@@ -51,8 +51,8 @@ PRESENT, LEFT = 0.7, 0.3
 """Tolerance of the share of the changes in the residual: from 1 before the subtraction, and from 0 after it."""
 TURNS = 4
 """Largest number of iterations."""
-LINEARISATIONS, PRECISE = 9, 1e-3
-"""Largest number of linearisations of a fit, and relative decrease of the cost at convergence."""
+LINEARISATIONS = 9
+"""Largest number of linearisations of a fit."""
 
 
 def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
@@ -105,10 +105,10 @@ def explicit_model(model: Model, training_data: TrainingData, leaves: float = np
         share = _share(model, training_data, changes) if _largest(changes, floors) > SEEN else 0.0
         if abs(share - 1.0) > PRESENT:
             return None
-        cost = joint(model, training_data, LINEARISATIONS, PRECISE).cost
+        cost = joint(model, training_data, LINEARISATIONS).cost
         for _ in range(TURNS):
             freed = replace(training_data, records=less(records, changes))
-            found = joint(model, freed, LINEARISATIONS, PRECISE)
+            found = joint(model, freed, LINEARISATIONS)
             if found.cost > BETTER * cost:
                 return None
             model, before = found.model, changes
@@ -135,14 +135,11 @@ def _share(model: Model, training_data: TrainingData, changes: list[Array]) -> f
 
 def without_steps(experiment: Experiment, model: Model) -> Experiment:
     """The experiment without the error of the explicit step, with a notice about this."""
-    records = tuple(at_period(r, model.sample_period) if _is_faster(r, model) else r for r in experiment.records)
+    period = model.sample_period
+    records = tuple(at_period(r, period) if is_faster(r, period) else r for r in experiment.records)
     freed = less(records, step_changes(model, records))
     message = (
         "the data were simulated with the explicit step of Eq. (7), which no real stage takes; its "
         "contribution was subtracted"
     )
     return replace(experiment, records=freed).noting(Notice(KIND, message))
-
-
-def _is_faster(record: Record, model: Model) -> bool:
-    return record.sample_period < 0.999 * model.sample_period

@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.residual.explicit_step import KIND, explicit_model, step_changes, without_steps
+from piezo_hysteresis.discrepancy.explicit_step import KIND, explicit_model, step_changes, without_steps
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, AsymmetricHysteresis, BoucWen, HysteresisExponent, PublishedBoucWen
 from piezo_hysteresis.effects.extent import Extent

@@ -1,0 +1,48 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Passes of a diagnosis that prepare the records."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from piezo_hysteresis.discrepancy import diagnose
+from piezo_hysteresis.discrepancy.diagnosis import Conclusion, Verdict
+from piezo_hysteresis.discrepancy.passes import RESAMPLED
+from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.record import Experiment
+
+PERIOD = 5e-4
+STAGE = Nanopositioner(mode=310.0, delay=2e-4, pole=2e-4)
+
+
+def played(stage, period, frequencies):
+    drives = ((f"sine_{f:g}hz", growing_sine(f, period, (0.4, 0.7, 1.0))) for f in frequencies)
+    return Experiment(tuple(stage.play(u, period, name) for name, u in drives))
+
+
+@pytest.mark.parametrize("share", [0.5, 0.3])
+def test_faster_records_are_compared_with_the_given_model(share):
+    model = identify(played(STAGE, PERIOD, (1.0, 10.0, 60.0)), memory=True).model
+    another_day = STAGE.on_another_day(np.random.default_rng(5))
+    same = diagnose(played(another_day, share * PERIOD, (1.0, 10.0, 60.0)), model)
+    assert [n.kind for n in same.experiment.notices].count(RESAMPLED) == 1
+    assert same.verdict is not Verdict.NAMED
+    later = diagnose(played(replace(another_day, filter_pole=2e-3), share * PERIOD, (1.0, 10.0, 60.0)), model)
+    assert later.conclusion is Conclusion.CHANGED_PARAMETER
+    (effect,) = later.effects()
+    assert effect["family"] == "lag" and effect["parameters"]["tau"]["value"] == pytest.approx(2e-3, rel=0.05)
