@@ -23,17 +23,20 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects import CATALOGUE, Effect
-from ..errors import IdentificationError, ParameterError
+from ..errors import DivergenceError, IdentificationError, ParameterError
 from ..identification.fit.fit import Progress
 from ..identification.inputs import experiment_of
 from ..identification.one_core import on_one_core
 from ..model.model import Model
-from ..record import Record
+from ..record import Notice, Record
 from .changes.same_stage import UNCHANGED
 from .diagnosis import Conclusion, Diagnosis, Verdict
 from .diagnosis_state import DiagnosisState
 from .passes import PASSES
 from .search.execution.cores import using_cores
+
+DIVERGES = "given_model_diverges"
+"""Kind of the notice that the given model is not used."""
 
 
 @on_one_core
@@ -98,11 +101,24 @@ def diagnose(
     # diverging trials have a large cost
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"), using_cores(cores):
         for run in PASSES:
-            found = run(state)
+            try:
+                found = run(state)
+            except (DivergenceError, IdentificationError) as error:
+                cause = error.__cause__ or error  # a fit from diverging start values
+                if state.model is None or not isinstance(cause, DivergenceError):
+                    raise
+                state = _without_given_model(state, cause)
+                found = run(state)
             if isinstance(found, Diagnosis):
                 return compared_with_given(found)
             state = found
     raise IdentificationError("diagnose: got no answer from the last pass, expected a diagnosis")
+
+
+def _without_given_model(state: DiagnosisState, error: DivergenceError) -> DiagnosisState:
+    """Continue with a model identified from the records, because the given one diverges on them."""
+    said = f"the given model diverges on these records ({error}); the diagnosis begins with one identified from them"
+    return replace(state, model=None, experiment=state.experiment.noting(Notice(DIVERGES, said)))
 
 
 def compared_with_given(found: Diagnosis) -> Diagnosis:

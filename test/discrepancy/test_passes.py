@@ -21,9 +21,13 @@ import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy import diagnose
+from piezo_hysteresis.discrepancy.diagnose import DIVERGES
 from piezo_hysteresis.discrepancy.diagnosis import Conclusion, Verdict
 from piezo_hysteresis.discrepancy.passes import RESAMPLED
+from piezo_hysteresis.effects import Arx, BoucWen, Softening
+from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment
 
 PERIOD = 5e-4
@@ -46,3 +50,14 @@ def test_faster_records_are_compared_with_the_given_model(share):
     assert later.conclusion is Conclusion.CHANGED_PARAMETER
     (effect,) = later.effects()
     assert effect["family"] == "lag" and effect["parameters"]["tau"]["value"] == pytest.approx(2e-3, rel=0.05)
+
+
+@pytest.mark.parametrize("frequencies", [(1.0, 60.0), (1.0, 5.0, 10.0, 60.0)])
+def test_a_given_model_that_diverges_is_replaced_by_an_identified_one(frequencies):
+    experiment = played(STAGE, PERIOD, frequencies)
+    unstable = Model((BoucWen(), Arx(a=(-1.58, 0.79), b=(0.21,)), Softening(k3=-1.0)), PERIOD, 2.0, 1e-5)
+    with pytest.raises(DivergenceError):
+        unstable.free_run(experiment)
+    found = diagnose(experiment, unstable)
+    assert [n.kind for n in found.experiment.notices].count(DIVERGES) == 1
+    assert found.gap.after < 0.5
