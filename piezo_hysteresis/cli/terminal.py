@@ -92,6 +92,30 @@ def show_notices(notices: Iterable[Notice]) -> None:
         out.print(f"{'caution' if notice.severe else 'note'}{where}: {notice.message}")
 
 
+PER_MINUTE = 250_000
+"""Number of samples that a slow or busy computer processes in a minute, if there are many."""
+
+
+def usual_time(size: int, least: str, minutes: int) -> str:
+    """Usual duration of a task, printed before it begins.
+
+    Parameters
+    ----------
+    size : int
+        Number of samples.
+    least : str
+        Duration of a short task.
+    minutes : int
+        Usual limit of the duration, also on a busy computer, where `size` does not make it longer [min].
+
+    Examples
+    --------
+    >>> usual_time(1_000_000, "2 s", 1)
+    '1000000 samples; this usually takes 2 s to 4 min'
+    """
+    return f"{size} samples; this usually takes {least} to {max(minutes, round(size / PER_MINUTE))} min"
+
+
 @contextmanager
 def progress(task: str, expected: str = "") -> Iterator[Callable[[str, float], None]]:
     """Show the progress of a long task on standard error: a bar, or without a terminal a line every 10 s.

@@ -32,10 +32,7 @@ from ...report.verdict import answer_verdict
 from ..options import reading_options
 from ..options.destination import add_results, require_new_file, require_new_results
 from ..options.stage_option import add_stage_arguments, diagnose_stage
-from ..terminal import console, progress, show, show_notices
-
-USUAL_TIME = "5 s to 2 min"
-"""Usual duration, also on a busy computer; `docs/performance.md` measures it."""
+from ..terminal import console, progress, show, show_notices, usual_time
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -137,7 +134,7 @@ def _of_recording(args: argparse.Namespace) -> Diagnosis:
     require_new_file("--correction", args.correction, args.force)
     start = None if args.model is None else model_file.load(args.model)
     experiment = reading_options.read(args)
-    with progress("diagnose", f"{experiment.size} samples; this usually takes {USUAL_TIME}") as report_progress:
+    with progress("diagnose", usual_time(experiment.size, "5 s", 2)) as report_progress:
         return diagnose(
             experiment,
             start,

@@ -32,11 +32,8 @@ from ...report.words import describes, error_sentence
 from ..options import reading_options
 from ..options.destination import add_results, require_new_results
 from ..options.operator_option import add_operator
-from ..terminal import console, progress, show, show_notices
+from ..terminal import console, progress, show, show_notices, usual_time
 from . import several_axes
-
-USUAL_TIME = "2 s to 1 min"
-"""Usual duration, also on a busy computer; `docs/performance.md` measures it."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -88,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     if has_several_drives(experiment):
         return several_axes.identify(experiment, args)
     orders = None if args.choose_orders else tuple(args.orders or (8, 8))
-    with progress("identify", f"{experiment.size} samples; this usually takes {USUAL_TIME}") as report_progress:
+    with progress("identify", usual_time(experiment.size, "2 s", 1)) as report_progress:
         found = identify(
             experiment,
             orders=orders,
