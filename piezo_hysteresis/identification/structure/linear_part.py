@@ -26,13 +26,13 @@ from ...record import Notice
 from ..records.excitation_content import excitation_content
 from .piece_fit import DELAY, GAIN, POLE, PieceFit, fit_pieces
 from .pieces import Kind, RecordPiece
-from .ringing import RESOLVED, SLOWEST, decay_after_steps, ringing_frequency
+from .ringing import RESOLVED, SLOWEST, decay_after_steps, ringing_lines
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
 
 LAGS = (0.3, 1.5, 4.0)
 """Start values of the delay [samples]."""
 RINGING_STAYS = 0.7
-"""A mode is accepted if at most this share of the power after a step remains."""
+"""A mode is accepted if at most this share of the power in pieces of the kind that rings remains."""
 DESCRIBED = 0.1
 """Two more orders of the ARX dynamics are accepted if at most this share of the power after a step remains."""
 POLE_GAINS = 0.98
@@ -133,7 +133,7 @@ def _with_two_more_orders(
     a, b = (np.convolve(c, decay).tolist() for c in ((1.0, *arx.array("a")), arx.array("b")))
     richer = Arx(a=tuple(a[1:]), b=tuple(b), delay=arx["delay"])
     found = fit_structure(before.model.with_effect(richer), pieces, floors)
-    describes = _behind_steps(found, pieces) < DESCRIBED * _behind_steps(before, pieces)
+    describes = _misfit_of(Kind.STEP, found, pieces) < DESCRIBED * _misfit_of(Kind.STEP, before, pieces)
     return found if describes and found.cost < best.cost else best
 
 
@@ -153,21 +153,22 @@ def mode_notices(fit: PieceFit) -> list[Notice]:
     mode = fit.model[ExtraResonance.name]
     shown = f"a mode at {mode['f0']:.4g} Hz with"
     if mode["zeta"] != SILENT_DAMPING:
-        said = f"the stage rings after the step: {shown} a damping ratio of {mode['zeta']:.2g}"
+        said = f"the stage rings after steps or sharp turns: {shown} a damping ratio of {mode['zeta']:.2g}"
     else:
         said = (
-            f"the gain rises with the frequency of the drive; {shown} {mode['r']:.3g} of the displacement explains this"
+            f"the gain rises with the frequency of the drive; {shown} {mode['r']:.3g} of the displacement explains this, "
+            "but its frequency, damping and share are not determined separately"
         )
     return [Notice("ringing", said)]
 
 
 def _with_mode(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
-    frequency = ringing_frequency(plain.model, pieces)
     found = plain
-    if frequency is not None:
+    for frequency, kind in ringing_lines(plain.model, pieces):
         mode = ExtraResonance(r=1.0, f0=frequency, zeta=DAMPING)
         rings = fit_structure(plain.model.with_effect(mode), pieces, floors)
-        if _behind_steps(rings, pieces) < RINGING_STAYS * _behind_steps(plain, pieces) and rings.cost < plain.cost:
+        described = _misfit_of(kind, rings, pieces) < RINGING_STAYS * _misfit_of(kind, plain, pieces)
+        if described and rings.cost < found.cost:
             found = rings
     if found is plain or abs(found.model.values()[SHARE] - 1.0) > WHOLE:
         silent = min(_silent(plain, pieces, floors), key=lambda f: f.cost, default=plain)
@@ -193,7 +194,8 @@ def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[flo
     yield fit_structure(plain.model.with_effect(mode), pieces, floors, SHAPE)
 
 
-def _behind_steps(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
+def _misfit_of(kind: Kind, fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
+    """Mean square misfit of the pieces of one kind, in floors; infinite without any."""
     counted = [p for p in pieces if p.kind is not Kind.CONDITIONING]
-    steps = [s for s, p in zip(fit.squares.tolist(), counted, strict=True) if p.kind is Kind.STEP]
-    return float(np.mean(steps)) if steps else np.inf
+    found = [s for s, p in zip(fit.squares.tolist(), counted, strict=True) if p.kind is kind]
+    return float(np.mean(found)) if found else np.inf

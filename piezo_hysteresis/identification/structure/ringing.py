@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How a stage rings after a step, from the residual of a model without a mode: its frequency, or its decay."""
+"""How a stage rings after a step or a sharp turn, from the residual without a mode: its frequency, or its decay."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from numpy.typing import NDArray
 from ...effects import ExtraResonance
 from ...model.model import Model
 from ...record import Record
-from .pieces import Kind, RecordPiece
+from .pieces import STILL, Kind, RecordPiece
 
 Array = NDArray[np.float64]
 
 CYCLES = 4.0
-"""Smallest number of cycles in the piece after the step."""
+"""Smallest number of cycles after a step or a turn."""
 RESOLVED = 0.45
 """Highest frequency [cycles per sample]; a faster mode acts as a lag."""
 SLOWEST = next(p.lower for p in ExtraResonance.parameters if p.name == "f0")
@@ -40,12 +40,21 @@ FEWEST = 12
 """Smallest number of such samples."""
 LONGEST = 0.95
 """Largest radius of the poles of a decay; a longer one is the work of a mode that the samples show, or creep."""
+ALIKE = 1.25
+"""Ratio of two frequencies up to which they are one line."""
+LINES = 3
+"""Largest number of lines."""
+SHARP = 10.0
+"""Ratio of a second difference of the drive to the median one from which the drive turns sharply; 1.4 in a sine."""
 STANDS_OUT = 10.0
 """Smallest ratio of the highest spectral line to the median of the spectrum, in power."""
 
 
-def ringing_frequency(model: Model, pieces: Sequence[RecordPiece]) -> float | None:
-    """Frequency of the highest spectral line of the residual after steps [Hz]; None if no line stands out.
+def ringing_lines(model: Model, pieces: Sequence[RecordPiece]) -> list[tuple[float, Kind]]:
+    """The highest spectral lines of the residual after steps and sharp turns, the highest first.
+
+    A sine does not turn sharply, so that the harmonics in its residual are no ringing. Behind slow turns the misfit of
+    the loop is higher than the ringing behind fast ones, so that one line is not enough.
 
     Parameters
     ----------
@@ -53,23 +62,60 @@ def ringing_frequency(model: Model, pieces: Sequence[RecordPiece]) -> float | No
         Model without a mode.
     pieces : sequence of RecordPiece
         Pieces in order.
+
+    Returns
+    -------
+    list of (float, Kind)
+        Frequency of every line [Hz], and the kind of the piece that shows it.
     """
-    best: tuple[float, float] | None = None
-    for record, e in _after_steps(model, pieces, 4 * CYCLES):
-        t = np.linspace(-1.0, 1.0, e.size)
-        e = e - np.polynomial.Polynomial.fit(t, e, 2)(t)
-        size = 8 * e.size
+    lines: list[tuple[float, float, Kind]] = []
+    for kind, record, echoes in _echoes(model, pieces):
+        longest = max(e.size for e in echoes)
+        size = 8 * longest
         frequency = np.fft.rfftfreq(size, record.sample_period)
-        power = np.abs(np.fft.rfft(e, size)) ** 2
-        low, high = max(CYCLES / record.duration, SLOWEST), RESOLVED / record.sample_period
-        band = (frequency > low) & (frequency < high)
+        power = np.zeros(frequency.size)
+        for e in echoes:
+            t = np.linspace(-1.0, 1.0, e.size)
+            power += np.abs(np.fft.rfft(e - np.polynomial.Polynomial.fit(t, e, 2)(t), size)) ** 2
+        low = max(CYCLES / (longest * record.sample_period), SLOWEST)
+        band = (frequency > low) & (frequency < RESOLVED / record.sample_period)
         if not band.any():
             continue
         top = int(np.argmax(np.where(band, power, 0.0)))
         height = float(power[top] / np.median(power[band]))
-        if height > STANDS_OUT and (best is None or height > best[0]):
-            best = (height, float(frequency[top]))
-    return None if best is None else best[1]
+        if height > STANDS_OUT:
+            lines.append((height, float(frequency[top]), kind))
+    found: list[tuple[float, Kind]] = []
+    for _, line, kind in sorted(lines, key=lambda one: -one[0]):
+        if all(max(line / other, other / line) > ALIKE for other, _ in found):
+            found.append((line, kind))
+    return found[:LINES]
+
+
+def _echoes(model: Model, pieces: Sequence[RecordPiece]) -> list[tuple[Kind, Record, list[Array]]]:
+    """Kind, record and residuals after a step, or between sharp turns, of every piece that has any."""
+    found = []
+    records = [p.record for p in pieces]
+    counted = (Kind.STEP, Kind.LOOP)
+    if not any(p.kind in counted for p in pieces):
+        return []
+    for piece, y in zip(pieces, model.free_run(records), strict=True):
+        cuts = _sharp_turns(piece.record.voltage) if piece.kind is Kind.LOOP else np.empty(0, np.int64)
+        if piece.kind is Kind.STEP or (piece.kind is Kind.LOOP and cuts.size):
+            parts = np.split(piece.record.displacement - y, cuts)
+            echoes = [e for e in parts if e.size >= 4 * CYCLES]
+            if echoes:
+                found.append((piece.kind, piece.record, echoes))
+    return found
+
+
+def _sharp_turns(voltage: Array) -> NDArray[np.int64]:
+    """Samples at which the slope of the drive jumps."""
+    bends = np.abs(np.diff(voltage, 2))
+    if bends.size == 0:
+        return np.empty(0, np.int64)
+    least = max(SHARP * float(np.median(bends)), STILL * float(np.ptp(voltage)))
+    return np.flatnonzero(bends > least) + 1
 
 
 def decay_after_steps(model: Model, pieces: Sequence[RecordPiece]) -> Array | None:
