@@ -156,8 +156,8 @@ def mode_notices(fit: PieceFit) -> list[Notice]:
         said = f"the stage rings after steps or sharp turns: {shown} a damping ratio of {mode['zeta']:.2g}"
     else:
         said = (
-            f"the gain rises with the frequency of the drive; {shown} {mode['r']:.3g} of the displacement explains this, "
-            "but its frequency, damping and share are not determined separately"
+            f"the gain rises with the frequency of the drive; {shown} {mode['r']:.3g} of the displacement explains "
+            "this, but its frequency, damping and share are not determined separately"
         )
     return [Notice("ringing", said)]
 

@@ -46,6 +46,8 @@ LINES = 3
 """Largest number of lines."""
 SHARP = 10.0
 """Ratio of a second difference of the drive to the median one from which the drive turns sharply; 1.4 in a sine."""
+STRAIGHT = 0.01
+"""Largest deviation of the drive from a straight line between two sharp turns, as a share of the largest drive."""
 STANDS_OUT = 10.0
 """Smallest ratio of the highest spectral line to the median of the spectrum, in power."""
 
@@ -53,8 +55,8 @@ STANDS_OUT = 10.0
 def ringing_lines(model: Model, pieces: Sequence[RecordPiece]) -> list[tuple[float, Kind]]:
     """The highest spectral lines of the residual after steps and sharp turns, the highest first.
 
-    A sine does not turn sharply, so that the harmonics in its residual are no ringing. Behind slow turns the misfit of
-    the loop is higher than the ringing behind fast ones, so that one line is not enough.
+    After a sharp turn only drives that go on straight are used, because the misfit of the loop on a sine has harmonics.
+    Behind slow turns this misfit is higher than the ringing behind fast ones, so that one line is not enough.
 
     Parameters
     ----------
@@ -94,19 +96,27 @@ def ringing_lines(model: Model, pieces: Sequence[RecordPiece]) -> list[tuple[flo
 
 def _echoes(model: Model, pieces: Sequence[RecordPiece]) -> list[tuple[Kind, Record, list[Array]]]:
     """Kind, record and residuals after a step, or between sharp turns, of every piece that has any."""
-    found = []
+    found: list[tuple[Kind, Record, list[Array]]] = []
     records = [p.record for p in pieces]
-    counted = (Kind.STEP, Kind.LOOP)
-    if not any(p.kind in counted for p in pieces):
-        return []
+    if not any(p.kind in (Kind.STEP, Kind.LOOP) for p in pieces):
+        return found
+    most = STRAIGHT * max(float(np.abs(r.voltage).max()) for r in records)
     for piece, y in zip(pieces, model.free_run(records), strict=True):
-        cuts = _sharp_turns(piece.record.voltage) if piece.kind is Kind.LOOP else np.empty(0, np.int64)
-        if piece.kind is Kind.STEP or (piece.kind is Kind.LOOP and cuts.size):
-            parts = np.split(piece.record.displacement - y, cuts)
-            echoes = [e for e in parts if e.size >= 4 * CYCLES]
-            if echoes:
-                found.append((piece.kind, piece.record, echoes))
+        echoes, drive = [piece.record.displacement - y], piece.record.voltage
+        if piece.kind is Kind.LOOP and (cuts := _sharp_turns(drive)).size:
+            parts = zip(np.split(echoes[0], cuts), np.split(drive, cuts), strict=True)
+            echoes = [e for e, u in parts if _bend(u) <= most]
+        elif piece.kind is not Kind.STEP:
+            continue
+        if echoes := [e for e in echoes if e.size >= 4 * CYCLES]:
+            found.append((piece.kind, piece.record, echoes))
     return found
+
+
+def _bend(voltage: Array) -> float:
+    """Largest deviation from a straight line [V]; a bent drive excites the loop, whose harmonics are no ringing."""
+    at = np.arange(voltage.size)
+    return float(np.abs(voltage - np.polynomial.Polynomial.fit(at, voltage, 1)(at)).max())
 
 
 def _sharp_turns(voltage: Array) -> NDArray[np.int64]:
