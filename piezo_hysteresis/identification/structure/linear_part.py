@@ -142,6 +142,11 @@ def held_by(fit: PieceFit) -> tuple[str, ...]:
     return tuple(n for n in (*SHAPE, SHARE) if n in fit.model.values() and n not in fit.names)
 
 
+def mode_is_inferred(model: Model) -> bool:
+    """Whether a mode stands for a gain that rises with frequency, with an assumed damping, because it does not ring."""
+    return ExtraResonance.name in model and model[ExtraResonance.name]["zeta"] == SILENT_DAMPING
+
+
 def mode_notices(fit: PieceFit) -> list[Notice]:
     """``ringing`` with the numbers of the mode, if there is one; one that does not ring has the assumed damping."""
     order = fit.model[Arx.name].array("a").size
@@ -152,12 +157,12 @@ def mode_notices(fit: PieceFit) -> list[Notice]:
         return []
     mode = fit.model[ExtraResonance.name]
     shown = f"a mode at {mode['f0']:.4g} Hz with"
-    if mode["zeta"] != SILENT_DAMPING:
+    if not mode_is_inferred(fit.model):
         said = f"the stage rings after steps or sharp turns: {shown} a damping ratio of {mode['zeta']:.2g}"
     else:
         said = (
-            f"the gain rises with the frequency of the drive; {shown} {mode['r']:.3g} of the displacement explains "
-            "this, but its frequency, damping and share are not determined separately"
+            f"the gain changes with the frequency of the drive; {shown} a share of {mode['r']:.3g} stands for this, "
+            "but its frequency, damping and share are not determined separately and have no intervals"
         )
     return [Notice("ringing", said)]
 

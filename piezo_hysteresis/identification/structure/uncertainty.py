@@ -23,7 +23,7 @@ import numpy as np
 from ...effects import MEMORY, Creep
 from ...errors import IdentificationError
 from ..fit.fit import Fit
-from .linear_part import SHAPE, SHARE
+from .linear_part import SHAPE, SHARE, mode_is_inferred
 from .piece_fit import DELAY, POLE, Array, PieceFit, free_directions
 from .pieces import Kind, RecordPiece
 from .prior import INDEPENDENT
@@ -63,7 +63,10 @@ def spread_of(full: PieceFit, final: PieceFit, chosen: Judged, judged: Sequence[
 
 
 def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float], spread: Array) -> Fit:
-    """The fit to pieces as a `Fit`; the variance from the residual is added to `spread`."""
+    """The fit to pieces as a `Fit`; the variance from the residual is added to `spread`.
+
+    The numbers of an inferred mode have no interval: each depends on the values that were assumed for the others.
+    """
     numbers = len(found.names)
     total = found.total
     counted = [p for p in pieces if p.kind is not Kind.CONDITIONING]
@@ -93,10 +96,12 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
     bounds = tuple(n for n in found.names if values[n] in (rows[n].lower, rows[n].upper))
     if not np.isfinite(covariance).all():
         raise IdentificationError("structure: the inner products of the fit are not finite; check the records")
+    assumed = (*SHAPE, SHARE) if mode_is_inferred(found.model) else ()
+    stated = [k for k, n in enumerate(found.names) if n not in assumed]
     return Fit(
         model=found.model,
-        names=found.names,
-        covariance=covariance + spread,
+        names=tuple(found.names[k] for k in stated),
+        covariance=(covariance + spread)[np.ix_(stated, stated)],
         cost=found.cost,
         rms=tuple(rms),
         nuisances=tuple(found.zeros[[run_of[o]]] for o in origins),
