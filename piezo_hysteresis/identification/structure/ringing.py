@@ -105,7 +105,7 @@ def _echoes(model: Model, pieces: Sequence[RecordPiece]) -> list[tuple[Kind, Rec
         echoes, drive = [piece.record.displacement - y], piece.record.voltage
         if piece.kind is Kind.LOOP and (cuts := _sharp_turns(drive)).size:
             parts = zip(np.split(echoes[0], cuts), np.split(drive, cuts), strict=True)
-            echoes = [e for e, u in parts if _bend(u) <= most]
+            echoes = [e for e, u in parts if u.size >= 4 * CYCLES and _bend(u) <= most]
         elif piece.kind is not Kind.STEP:
             continue
         if echoes := [e for e in echoes if e.size >= 4 * CYCLES]:
