@@ -34,7 +34,8 @@ from ..excitation_check import check_motion, moves
 from ..residual.noise_floor import floors, stroke
 from .change_kinds import ParameterChange
 from .change_search import ChangeSearch
-from .same_stage import changed_model
+from .moved_group import is_as_good
+from .same_stage import ERROR, changed_model
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -53,6 +54,9 @@ class Recalibration:
         Reading at zero displacement [m].
     before, after : float
         Free-run error with the zero fitted in every record [% of range].
+    known : float
+        Free-run error that the old model states, or the noise floor of the records if it is larger [% of range]; 0 if
+        the old model states none.
     """
 
     model: Model
@@ -62,6 +66,12 @@ class Recalibration:
     offset: float
     before: float
     after: float
+    known: float = 0.0
+
+    @property
+    def is_as_good(self) -> bool:
+        """Whether the new model is as good as the old one was, by the criterion of the recalibration while running."""
+        return not self.known or is_as_good(self.after, self.known)
 
 
 def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
@@ -91,7 +101,8 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     used = [i for i, r in enumerate(records) if moves(r)]
     used = [i for i in used if not records[i].truncated] or used
     check_motion("recalibrate", [records[i] for i in used])
-    search = ChangeSearch(model, records, used, floors(records).tolist())
+    least = floors(records)
+    search = ChangeSearch(model, records, used, least.tolist())
     best = search.shaped("delay", free=search.sides)
     best = min((best, search.account("none", free=search.sides)), key=lambda account: account.cost)
     session = search.session(best)
@@ -119,6 +130,7 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     origin = provenance(experiment, rms, 100.0 * rms / span)
     new = replace(bare.with_effect(old.with_values(y0=zero)), provenance={**model.provenance, **origin})
     kept = after < before
+    stated = float(model.provenance.get(ERROR, "0"))
     return Recalibration(
         new,
         session.get("gain", 0.0) if kept else 0.0,
@@ -127,4 +139,5 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
         zero,
         100.0 * before / span,
         100.0 * rms / span,
+        100.0 * max(stated, float(np.sqrt(np.mean(least[used] ** 2)))) / span if stated else 0.0,
     )
