@@ -76,6 +76,6 @@ def _judged(found: Recalibration) -> str:
     if found.is_as_good or not describes(found.after):
         return error_sentence(found.after)
     return (
-        f"The model does not describe this stage: after the fit its error is {found.after:.3g} % of the range, expected "
-        f"at most {EXCESS:g} times the {found.known:.3g} % that it had; {FULL}."
+        f"The model does not describe this stage: after the fit its error is {found.after:.3g} % of the range, "
+        f"expected at most {EXCESS:g} times the {found.known:.3g} % that it had; {FULL}."
     )

@@ -51,7 +51,7 @@ AROUND = 0.2
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Account:
-    """One explanation: its cost, and its parameters with the RMS in floors per unit of each, in the order of `names`."""
+    """One explanation: its cost, its parameters, and the RMS in floors per unit of each, in the order of `names`."""
 
     key: str
     cost: float
@@ -217,9 +217,10 @@ class ChangeSearch:
         return replace(found, size=sum(found.own[r] for r in rows))
 
     def halves(self, best: Account) -> Array:
-        """Half 95 % jackknife intervals of the size, of gain and of loop height: leaving out groups of pieces, or records.
+        """Half 95 % jackknife intervals of the size, of gain and of loop height.
 
-        The wider one counts. A part without which little of the change remains is not used.
+        Groups of pieces or records are left out, and the wider one counts.
+        A part without which little of the change remains is not used.
         """
         numbers = np.unique(self.labels)
         groups = [g for g in np.array_split(numbers, min(6, numbers.size)) if g.size]
