@@ -176,12 +176,16 @@ class ChangeSearch:
         numbers["gain"] -= self.loop_share * numbers.get("loop", 0.0)
         return numbers
 
-    def error(self, account: Account) -> float:
-        """RMS error that an account leaves [m], with equal weights of the records."""
+    def of_equal_records(self, account: Account, floors: Sequence[float]) -> float:
+        """V that an account without change leaves, with equal weights of the records; `floors` of the used records [m].
+
+        A model states its error with these weights. Gain and loop height count as in the cost of the account.
+        """
         y, columns = self._columns(account.key, account.size, account.names)
         left = self._weighted(self.measured - y - account.theta @ columns, np.ones(self.measured.size))
-        starts = np.cumsum([0, *self.sizes[:-1]])
-        return float(np.sqrt(np.mean(np.add.reduceat(left**2, starts) / self.sizes)))
+        power = np.add.reduceat(left**2, np.cumsum([0, *self.sizes[:-1]])) / self.sizes
+        moved = sum((account.own[n] / DAY_TO_DAY[n]) ** 2 for n in self.sides)
+        return float(np.mean(power) / np.mean(np.square(floors)) + PENALTY * moved)
 
     def shaped(
         self,

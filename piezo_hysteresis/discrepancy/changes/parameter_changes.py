@@ -87,7 +87,7 @@ def find_change(
     """
     search = ChangeSearch(model, records, used, floors)
     day = search.account("none")
-    if day.cost <= ADEQUATE:
+    if _is_known(search, day, floors):
         return None
     keys = [k for k, kind in KINDS.items() if k in SHAPES or (kind.rows and kind.rows[0] in search.predicted[0].rows)]
     first = [k for k in (*search.sides, *keys) if k not in SECOND_ORDER]
@@ -154,13 +154,19 @@ def _moved_too(
     return found
 
 
-def left_by_day(model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]) -> float:
-    """RMS error that a day's differences of zero, gain and loop height leave [m]; arguments as `find_change`.
-
-    Records have equal weights, as in the error that a model states.
-    """
+def is_unchanged(model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]) -> bool:
+    """Whether the differences of a day leave no more than the known error; arguments as `find_change`."""
     search = ChangeSearch(model, records, used, floors)
-    return search.error(search.account("none"))
+    return _is_known(search, search.account("none"), floors)
+
+
+def _is_known(search: ChangeSearch, day: Account, floors: Sequence[float]) -> bool:
+    """The one criterion for a stage that has not changed, in the measure of the error that a model states.
+
+    Parts of a record can have a larger known error than others. With the weights of the search, which differ from those
+    of that measure, an unchanged stage may seem to have changed, and a small change may be hidden.
+    """
+    return search.of_equal_records(day, [floors[i] for i in search.used]) <= ADEQUATE
 
 
 def _filters_of_second_order(search: ChangeSearch) -> list[Account]:

@@ -16,10 +16,14 @@
 
 Records of one stage differ by about 0.5 % from one day to another. A model of many records with these four new numbers
 predicts better than a new model of one new record.
+
+New records seldom show what the stage did before them, and its hysteresis remembers that until the drive has been at
+both ends of its range. The samples up to there are neither fitted nor part of the errors.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,9 +31,10 @@ import numpy as np
 from ...effects import Offset
 from ...errors import IdentificationError, ParameterError
 from ...identification.fit.normal_equations import Nuisance, residuals
+from ...identification.records.conditioning_split import conditioning_length, covers
 from ...model.model import Model
 from ...model.provenance import provenance
-from ...record import Experiment
+from ...record import CONDITIONING, Experiment, Record
 from ..excitation_check import check_motion, moves
 from ..residual.noise_floor import floors, stroke
 from .change_kinds import ParameterChange
@@ -97,8 +102,8 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     ModelError
         If the records are faster than the model.
     """
-    records = experiment.records
-    used = [i for i, r in enumerate(records) if moves(r)]
+    records = _after_a_loop(experiment.records)
+    used = [i for i, r in enumerate(records) if moves(r) and r.phase != CONDITIONING]
     used = [i for i in used if not records[i].truncated] or used
     check_motion("recalibrate", [records[i] for i in used])
     least = floors(records)
@@ -107,8 +112,15 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     best = min((best, search.account("none", free=search.sides)), key=lambda account: account.cost)
     session = search.session(best)
     change = ParameterChange("delay", best.size, (best.size, best.size), (), best.cost, best.cost, session)
+
+    def zeroed(candidate: Model) -> Model:
+        bare = candidate.without(Offset.name)
+        left = residuals(bare, records)
+        old = candidate[Offset.name] if Offset.name in candidate else Offset()
+        return bare.with_effect(old.with_values(y0=float(np.mean([np.mean(left[i]) for i in used]))))
+
     try:
-        fitted = changed_model(model, change, records)
+        fitted = zeroed(changed_model(model, change, records))
     except ParameterError as reason:
         raise IdentificationError(
             f"recalibrate: the gain would have to be {1.0 + session.get('gain', 0.0):.3g} times that of the model, "
@@ -120,24 +132,31 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
         return float(np.sqrt(np.mean([np.mean(left[i] ** 2) for i in used])))
 
     before, after = error(model), error(fitted)
-    new = fitted if after < before else model
-    bare = new.without(Offset.name)
-    left = residuals(bare, records)
-    zero = float(np.mean([np.mean(left[i]) for i in used]))
-    old = new[Offset.name] if Offset.name in new else Offset()
+    kept = after < before
+    new = fitted if kept else zeroed(model)
     span = stroke(records)
     rms = min(before, after)
     origin = provenance(experiment, rms, 100.0 * rms / span)
-    new = replace(bare.with_effect(old.with_values(y0=zero)), provenance={**model.provenance, **origin})
-    kept = after < before
     stated = float(model.provenance.get(ERROR, "0"))
     return Recalibration(
-        new,
+        replace(new, provenance={**model.provenance, **origin}),
         session.get("gain", 0.0) if kept else 0.0,
         session.get("loop", 0.0) if kept else 0.0,
         best.size if kept else 0.0,
-        zero,
+        new[Offset.name]["y0"],
         100.0 * before / span,
         100.0 * rms / span,
         100.0 * max(stated, float(np.sqrt(np.mean(least[used] ** 2)))) / span if stated else 0.0,
     )
+
+
+def _after_a_loop(records: Sequence[Record]) -> tuple[Record, ...]:
+    """The records, cut where the drive has been at both ends of its range, so that the past no longer matters."""
+    cut: list[Record] = []
+    lead: list[Record] = []
+    for record in records:
+        lead = lead if record.continues else []
+        samples = 0 if lead and covers(lead, record) else conditioning_length(record)
+        cut += [replace(record[:samples], phase=CONDITIONING), record[samples:]] if samples else [record]
+        lead = [*lead, record]
+    return tuple(cut)

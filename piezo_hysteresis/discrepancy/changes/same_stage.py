@@ -33,8 +33,7 @@ from ..gap import measure_gap, with_stated_error
 from ..residual.localise import located
 from ..residual.noise_floor import floors, noise_floors, stroke
 from .change_kinds import KINDS, LEAVES, ParameterChange
-from .moved_group import is_as_good
-from .parameter_changes import find_change, left_by_day
+from .parameter_changes import find_change, is_unchanged
 from .signatures import DRIFT_TIME, SHAPES, creep_numbers, loop_numbers, shaped_model
 
 ERROR, HASH = "free_run_error", "data_hash"
@@ -83,15 +82,14 @@ def same_stage(
     known = float(model.provenance.get(ERROR, "0"))
     limits = np.maximum(least, known).tolist()
     try:
-        change = find_change(model, records, used, limits, progress)
-        stated = float(np.sqrt(np.mean(np.square([limits[i] for i in used]))))
-        if change is None and known and is_as_good(left_by_day(model, records, used, limits), stated):
+        if known and is_unchanged(model, records, used, limits):
             return Notice(
                 UNCHANGED,
                 "nothing has changed since the model was identified: apart from its zero, gain and loop height, which "
                 f"differ from day to day, its error is within the known error of {1e9 * known:.3g} nm; a gap that is "
                 "found now existed then too",
             )
+        change = find_change(model, records, used, limits, progress)
         if change is None:
             return None
         changed = changed_model(model, change, records)
