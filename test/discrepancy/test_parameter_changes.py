@@ -234,6 +234,12 @@ def test_another_hysteresis_is_not_a_few_changed_parameters(model, changed):
     assert change_of(model, replace(STAGE, noise_seed=1, **changed)) is None
 
 
+def test_three_changes_that_leave_the_known_error_are_all_stated(model, another_day):
+    gain, loop = 1.05 * another_day.gain, 0.8 * another_day.loop
+    change = change_of(model, replace(another_day, gain=gain, loop=loop, filter_delay=2.0 * PERIOD))
+    assert set(change.names) == {"extra_delay", "gain", "loop_height"}
+
+
 def test_gain_and_loop_height_that_both_have_changed_are_both_stated(model, another_day):
     change = change_of(model, replace(another_day, gain=1.05 * another_day.gain, loop=0.7 * another_day.loop))
     assert set(change.names) == {"gain", "loop_height"}

@@ -51,10 +51,14 @@ AROUND = 0.2
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Account:
-    """One explanation: its cost, its parameters, and the RMS in floors per unit of each, in the order of `names`."""
+    """One explanation: its cost, the V that remains, its parameters, and the RMS in floors per unit of each.
+
+    The cost is the remaining V and the penalties. Parameters are in the order of `names`.
+    """
 
     key: str
     cost: float
+    left: float
     size: float
     theta: Array
     names: tuple[str, ...]
@@ -138,23 +142,24 @@ class ChangeSearch:
         matrix = matrix / scale[:, None]
         gram, gradient, power = matrix @ matrix.T, matrix @ target, float(target @ target)
 
-        def solved(penalties: Sequence[Array]) -> tuple[float, Array]:
-            """Cost and parameters with quadratic penalties on some directions."""
+        def solved(penalties: Sequence[Array]) -> tuple[float, float, Array]:
+            """Cost, remaining V and parameters with quadratic penalties on some directions."""
             added = sum((np.outer(row, row) for row in penalties), np.zeros(gram.shape)) / np.outer(scale, scale)
             found = np.linalg.lstsq(gram + added, gradient, rcond=1e-12)[0]
-            return float(power - 2.0 * gradient @ found + found @ (gram + added) @ found), found / scale
+            left = float(power - 2.0 * gradient @ found + found @ gram @ found)
+            return left + float(found @ added @ found), left, found / scale
 
         held = [self._penalties(key, name, names) for name in self.sides if name not in free]
         most = PENALTY * FARTHEST**2
         best = min(
             (
-                (cost + most * sum(not row.any() for row in chosen), theta)
+                (cost + most * sum(not row.any() for row in chosen), left, theta)
                 for chosen in itertools.product(*held)
-                for cost, theta in (solved(chosen),)
+                for cost, left, theta in (solved(chosen),)
             ),
             key=lambda found: found[0],
         )
-        return Account(key, best[0], size, best[1], names, scale)
+        return Account(key, best[0], best[1], size, best[2], names, scale)
 
     def _penalties(self, key: str, name: str, names: Sequence[str]) -> list[Array]:
         """Directions of the parameters `names` along which gain or loop height may have a penalty; zeros for none.

@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 EXPLAINS = 0.7
 """Largest share of V that a change may leave, relative to V with fitted gain, loop height and zero."""
 NEARLY_ALL = 0.08
-"""Largest share of V that a change may leave if V remains above `LEAVES`."""
+"""Largest share of V that a lag may leave if V remains above `LEAVES`: samples do not show its form between them."""
 SEEN = 0.7
 """Smallest size of a reported change, RMS in floors."""
 RIVAL = 1.15
@@ -104,13 +104,12 @@ def find_change(
     found = [_simulated(e, model, records, used, floors) if _may_be(e, least) else e for e in found]
     # at similar cost, a delay or a filter of first order comes before one of second order
     found.sort(key=lambda e: e.account.cost * (RIVAL if e.account.key in SECOND_ORDER else 1.0))
-    sides = [
-        e for e in found if e.account.key in DAY_TO_DAY and e.account.cost < RIVAL * max(1.0, found[0].account.cost)
-    ]
+    most = RIVAL * max(1.0, found[0].account.cost)
+    sides = [e for e in found if e.account.key in DAY_TO_DAY and e.account.cost < most]
     if found[0] in sides:  # of gain and loop height, the one that is farther from what differs from day to day
         found.sort(key=lambda e: e is not max(sides, key=lambda s: _in_deviations(s.search, s.account, s.account.key)))
     best, search = found[0].account, found[0].search
-    leaves = best.cost < LEAVES or best.cost < NEARLY_ALL * day.cost
+    leaves = best.left < LEAVES or (best.key in SHAPES and best.left < NEARLY_ALL * day.cost)
     if not (leaves and best.cost < EXPLAINS * day.cost and day.cost - best.cost > SEEN**2):
         return None
     jackknife, *beside = search.halves(best).tolist()
@@ -118,18 +117,16 @@ def find_change(
     size = found[0].size
     if not _is_sure(size, half) or (best.key in DAY_TO_DAY and abs(size) < FARTHEST * DAY_TO_DAY[best.key]):
         return None
-    same = RIVAL if best.cost < LEAVES else FORMS
+    same = RIVAL if best.left < LEAVES else FORMS
     near = [e.account.key for e in found[1:] if e.account.cost < same * max(1.0, best.cost)]
     also = _moved_too(search, best, dict(zip(search.sides, beside, strict=True)))
-    if len(also) == len(DAY_TO_DAY) and best.cost >= LEAVES:
-        return None  # three changes, and yet not the known error: another stage
     rivals = tuple(k for k in dict.fromkeys(near) if k != best.key and k not in also)
     interval = size - half, size + half
-    return ParameterChange(best.key, size, interval, rivals, day.cost, best.cost, search.session(best), also)
+    return ParameterChange(best.key, size, interval, rivals, day.cost, best.left, search.session(best), also)
 
 
 def _may_be(found: _Explanation, least: float) -> bool:
-    """Whether a lag may be the change: it is worth an exact simulation."""
+    """Whether a lag may be the change, so that it is worth an exact simulation."""
     return found.account.key in SHAPES and found.account.cost < FORMS * max(1.0, least)
 
 
@@ -163,8 +160,7 @@ def is_unchanged(model: Model, records: Sequence[Record], used: Sequence[int], f
 def _is_known(search: ChangeSearch, day: Account, floors: Sequence[float]) -> bool:
     """The one criterion for a stage that has not changed, in the measure of the error that a model states.
 
-    Parts of a record can have a larger known error than others. With the weights of the search, which differ from those
-    of that measure, an unchanged stage may seem to have changed, and a small change may be hidden.
+    With the weights of the search, an unchanged stage may seem to have changed, and a small change may be hidden.
     """
     return search.of_equal_records(day, [floors[i] for i in search.used]) <= ADEQUATE
 
@@ -208,8 +204,8 @@ def _simulated(
         return found
     search = ChangeSearch(shaped_model(model, key, size), records, used, floors)
     exact = search.shaped(key, near=0.0) if key == "delay" else search.account(key)
-    left = min(found.account.cost, exact.cost)
-    return replace(found, account=replace(found.account, cost=left))
+    least = min(found.account, exact, key=lambda account: account.cost)
+    return replace(found, account=replace(found.account, cost=least.cost, left=least.left))
 
 
 def _spread_of_forms(found: Sequence[_Explanation]) -> float:
