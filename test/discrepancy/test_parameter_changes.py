@@ -270,6 +270,12 @@ def test_a_recalibrated_model_must_be_as_good_as_it_was(model, changed, describe
     assert found.is_as_good is describes
 
 
+@pytest.mark.parametrize("frequency", [1.0, 10.0, 60.0])
+def test_one_kind_of_drive_is_compared_with_the_largest_error_of_a_kind(model, another_day, frequency):
+    """The stated error is a mean over kinds of drive; new records of one kind may have more."""
+    assert recalibrate(model, played(another_day, (frequency,))).is_as_good
+
+
 def test_the_gap_before_is_the_error_of_the_given_model(model):
     """Whatever a joint fit of its parameters could reach."""
     other = replace(STAGE, noise_seed=1, bend=0.6, width=0.25)

@@ -52,8 +52,8 @@ def run(args: argparse.Namespace) -> int:
     found = recalibrate(model, experiment)
     path = model_file.save(found.model, args.output)
     if args.json is not None:
-        numbers = ("gain", "loop_height", "lag", "offset", "before", "after", "known")
-        units = ("relative", "relative", "s", "m", *3 * ("percent_of_range",))
+        numbers = ("gain", "loop_height", "lag", "offset", "before", "after", "largest", "known")
+        units = ("relative", "relative", "s", "m", *4 * ("percent_of_range",))
         rows = {f"{n}_{u}": getattr(found, n) for n, u in zip(numbers, units, strict=True)}
         write_json(args.json, {"schema": 1, "model": str(path), **rows})
     out = console()
@@ -76,6 +76,6 @@ def _judged(found: Recalibration) -> str:
     if found.is_as_good or not describes(found.after):
         return error_sentence(found.after)
     return (
-        f"The model does not describe this stage: after the fit its error is {found.after:.3g} % of the range, "
-        f"expected at most {EXCESS:g} times the {found.known:.3g} % that it had; {FULL}."
+        f"The model does not describe this stage: after the fit its error in one record is {found.largest:.3g} % of "
+        f"the range, expected at most {EXCESS:g} times the {found.known:.3g} % that it had; {FULL}."
     )

@@ -27,13 +27,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...effects import Offset
 from ...errors import IdentificationError, ParameterError
 from ...identification.fit.normal_equations import Nuisance, residuals
 from ...identification.records.conditioning_split import conditioning_length, covers
 from ...model.model import Model
-from ...model.provenance import provenance
+from ...model.provenance import LARGEST, largest_error, provenance
 from ...record import CONDITIONING, Experiment, Record
 from ..excitation_check import check_motion, moves
 from ..residual.noise_floor import floors, stroke
@@ -41,6 +42,8 @@ from .change_kinds import ParameterChange
 from .change_search import ChangeSearch
 from .moved_group import is_as_good
 from .same_stage import ERROR, changed_model
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -59,9 +62,11 @@ class Recalibration:
         Reading at zero displacement [m].
     before, after : float
         Free-run error with the zero fitted in every record [% of range].
+    largest : float
+        Largest error of one record with the new model [% of range].
     known : float
-        Free-run error that the old model states, or the noise floor of the records if it is larger [% of range]; 0 if
-        the old model states none.
+        The same of the old model, as it states it, or the noise floor of the records if it is larger [% of range]; 0 if
+        it states none. A mean over kinds of drive is no measure for new records of one kind.
     """
 
     model: Model
@@ -71,12 +76,13 @@ class Recalibration:
     offset: float
     before: float
     after: float
-    known: float = 0.0
+    largest: float
+    known: float
 
     @property
     def is_as_good(self) -> bool:
         """Whether the new model is as good as the old one was, by the criterion of the recalibration while running."""
-        return not self.known or is_as_good(self.after, self.known)
+        return not self.known or is_as_good(self.largest, self.known)
 
 
 def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
@@ -127,17 +133,18 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
             f"which is beyond its bounds ({reason}); check stage, columns and units"
         ) from None
 
-    def error(candidate: Model) -> float:
+    def by_record(candidate: Model) -> Array:
         left = residuals(candidate, records, Nuisance(offset=True))
-        return float(np.sqrt(np.mean([np.mean(left[i] ** 2) for i in used])))
+        return np.sqrt([np.mean(left[i] ** 2) for i in used])
 
-    before, after = error(model), error(fitted)
+    single = by_record(model), by_record(fitted)
+    before, after = (float(np.sqrt(np.mean(s**2))) for s in single)
     kept = after < before
-    new = fitted if kept else zeroed(model)
+    new, single = (fitted, single[1]) if kept else (zeroed(model), single[0])
     span = stroke(records)
     rms = min(before, after)
-    origin = provenance(experiment, rms, 100.0 * rms / span)
-    stated = float(model.provenance.get(ERROR, "0"))
+    origin = {**provenance(experiment, rms, 100.0 * rms / span), **largest_error(single)}
+    stated = float(model.provenance.get(LARGEST, model.provenance.get(ERROR, "0")))
     return Recalibration(
         replace(new, provenance={**model.provenance, **origin}),
         session.get("gain", 0.0) if kept else 0.0,
@@ -146,6 +153,7 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
         new[Offset.name]["y0"],
         100.0 * before / span,
         100.0 * rms / span,
+        100.0 * float(single.max()) / span,
         100.0 * max(stated, float(np.sqrt(np.mean(least[used] ** 2)))) / span if stated else 0.0,
     )
 
