@@ -24,7 +24,6 @@ import numpy as np
 
 from ..record import Experiment
 
-
 LARGEST = "largest_record_error"
 """Key of the largest error of one record. The free-run error is a mean over kinds of drive, and one kind has more."""
 

@@ -152,8 +152,8 @@ class LiveDiagnosis:
             return f"No decision is possible within the limits and {self.longest:g} s. {self.separation.sentence()}"
         further = "" if self.separation is None else f" {self.separation.sentence()}"
         return (
-            f"All planned phases that fit into {self.longest:g} s were played ({update.time:.1f} s), and no explanation "
-            f"is certain: {update.sentence()}.{further}"
+            f"All planned phases that fit into {self.longest:g} s were played ({update.time:.1f} s), and no "
+            f"explanation is certain: {update.sentence()}.{further}"
         )
 
     def answer(self) -> dict[str, Any]:
