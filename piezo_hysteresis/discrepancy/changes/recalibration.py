@@ -135,15 +135,15 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
 
     def by_record(candidate: Model) -> Array:
         left = residuals(candidate, records, Nuisance(offset=True))
-        return np.sqrt([np.mean(left[i] ** 2) for i in used])
+        return np.asarray(np.sqrt([np.mean(left[i] ** 2) for i in used]))
 
     single = by_record(model), by_record(fitted)
     before, after = (float(np.sqrt(np.mean(s**2))) for s in single)
     kept = after < before
-    new, single = (fitted, single[1]) if kept else (zeroed(model), single[0])
+    new, by_new = (fitted, single[1]) if kept else (zeroed(model), single[0])
     span = stroke(records)
     rms = min(before, after)
-    origin = {**provenance(experiment, rms, 100.0 * rms / span), **largest_error(single)}
+    origin = {**provenance(experiment, rms, 100.0 * rms / span), **largest_error(by_new.tolist())}
     stated = float(model.provenance.get(LARGEST, model.provenance.get(ERROR, "0")))
     return Recalibration(
         replace(new, provenance={**model.provenance, **origin}),
@@ -153,7 +153,7 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
         new[Offset.name]["y0"],
         100.0 * before / span,
         100.0 * rms / span,
-        100.0 * float(single.max()) / span,
+        100.0 * float(by_new.max()) / span,
         100.0 * max(stated, float(np.sqrt(np.mean(least[used] ** 2)))) / span if stated else 0.0,
     )
 
