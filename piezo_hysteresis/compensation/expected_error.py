@@ -51,7 +51,9 @@ class ExpectedError:
     def total(self) -> float:
         """Root of the sum of squares of `planned` and `free_run`, or without it of `planned` and `parameters` [m].
 
-        The free-run error already includes the error from the parameters.
+        The free-run error was measured, and already includes the error from the parameters on that drive. Their
+        uncertainty on this path can be larger, where the path goes beyond what was recorded or the records determine
+        some parameters only together.
         """
         model = self.free_run if self.free_run is not None else self.parameters or 0.0
         return float(np.hypot(self.planned, model))

@@ -23,6 +23,7 @@ from ..errors import DivergenceError
 from ..identification.fit.fit import Fit, Progress
 from ..identification.fit.form_uncertainty import with_form_uncertainty
 from ..identification.fit.normal_equations import Nuisance
+from ..model.model import Model
 from ..record import Experiment
 from .diagnosis import Conclusion, Diagnosis, Verdict
 from .excitation_check import missing_excitation
@@ -52,6 +53,7 @@ def concluded(
     where: tuple[ResidualShare, ...],
     selection: Selection,
     progress: Progress,
+    given: Model | None = None,
 ) -> Diagnosis:
     """The last fits, the gap on the test records, the verdict, and the next experiment.
 
@@ -67,6 +69,8 @@ def concluded(
         Result of the search.
     progress : callable
         Called with a message and the fraction done.
+    given : Model, optional
+        Model that the user gave. The gap before is its own error, not that after a joint fit.
     """
     records, least, training_data = setup.records, setup.least, setup.training_data
     progress("gap", 0.85)
@@ -106,13 +110,18 @@ def concluded(
         conclusion, reason = Conclusion.INSUFFICIENT_DATA, DIVERGES
     else:
         conclusion, reason = conclusion_of(selection, falls, falls or not named, gap)
+    if given is not None:
+        chosen = tuple(p.index for p in gap.per_phase)
+        free = replace(training_data.nuisance, offset=True), replace(final_training_data.nuisance, offset=True)
+        with suppress(DivergenceError):
+            gap = measure_gap((given, final.model), records, chosen, least.tolist(), setup.span, free, gap.unseen)
     is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
     found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
     return Diagnosis(
         conclusion=conclusion,
         reason=reason,
         model=with_stated_error(final.stated_model, gap.live, setup.span),
-        baseline=with_stated_error(first.stated_model, gap.before, setup.span),
+        baseline=with_stated_error(first.stated_model if given is None else given, gap.before, setup.span),
         selection=selection,
         fit=final,
         where=where,

@@ -94,7 +94,7 @@ class Diagnosis(Pictured):
     def names(self) -> tuple[str, ...]:
         """Identifiers of the named effects, in the order of the search."""
         if self.change is not None:
-            return (self.change.kind.name,)
+            return self.change.names
         if self.verdict is not Verdict.NAMED or self.selection is None:
             return ()
         return tuple(s.best.effect.public_name() for s in self.selection.accepted)
@@ -122,7 +122,7 @@ class Diagnosis(Pictured):
     def effects(self) -> list[dict[str, Any]]:
         """The named effects, as in ``answer.json``."""
         if self.change is not None and self.gap is not None:
-            return [self.change.row(self.gap.explained)]
+            return self.change.rows(self.gap.explained)
         if self.verdict is not Verdict.NAMED or self.selection is None or self.fit is None:
             return []
         rows = []

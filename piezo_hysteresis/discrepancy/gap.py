@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..identification.fit.normal_equations import Nuisance
 from ..model.model import Model
-from ..model.provenance import free_run
+from ..model.provenance import LARGEST, free_run
 from ..record import Record
 from .residual.residual import residuals_on
 from .search.cross_validation import ADEQUATE
@@ -99,7 +99,8 @@ class Gap:
 
 def with_stated_error(model: Model, percent: float, stroke: float) -> Model:
     """The model with its free-run error in the provenance; `percent` is in % of the `stroke` [m]."""
-    return replace(model, provenance={**model.provenance, **free_run(0.01 * percent * stroke, percent)})
+    origin = {key: text for key, text in model.provenance.items() if key != LARGEST}  # that of other records
+    return replace(model, provenance={**origin, **free_run(0.01 * percent * stroke, percent)})
 
 
 def measure_gap(

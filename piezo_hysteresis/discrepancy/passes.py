@@ -211,7 +211,7 @@ def _freed(state: DiagnosisState, explicit: Model) -> DiagnosisState | Diagnosis
 
 def conclude(state: DiagnosisState) -> Diagnosis:
     """Ends with the last fits, the gap on the test records, and the verdict."""
-    return concluded(state.experiment, state.fitted, state.where, state.searched, state.progress)
+    return concluded(state.experiment, state.fitted, state.where, state.searched, state.progress, state.model)
 
 
 PASSES: tuple[Pass, ...] = (

@@ -17,12 +17,20 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 
 import numpy as np
 
 from ..record import Experiment
+
+LARGEST = "largest_record_error"
+"""Key of the largest error of one record. The free-run error is a mean over kinds of drive, and one kind has more."""
+
+
+def largest_error(errors: Iterable[float]) -> Mapping[str, str]:
+    """The largest of the RMS free-run errors of single records [m]."""
+    return {LARGEST: repr(float(f"{max(errors):.6g}"))}
 
 
 def provenance(experiment: Experiment, error: float, percent: float) -> Mapping[str, str]:

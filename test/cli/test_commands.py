@@ -121,12 +121,14 @@ def test_report_writes_a_page_with_its_figures(piezo, identified, folder, tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("column", "factor", "status"), [("same", 1.02, 0), ("clipped", 1.0, 1), ("micrometres", 1e6, 1)]
+    ("column", "factor", "status"),
+    [("same", 1.02, 0), ("clipped", 1.0, 1), ("micrometres", 1e6, 1), ("bent", 1.0, 1)],
 )
 def test_recalibrate_says_whether_its_model_can_be_trusted(piezo, identified, folder, tmp_path, column, factor, status):
     (record,) = recording.read(folder / "04_triangle.npz")
     u, y = record.voltage, factor * record.displacement
     y = np.minimum(y, 0.9 * y.max()) if column == "clipped" else y
+    y = y + 0.05 * np.ptp(y) * (y / np.ptp(y)) ** 3 if column == "bent" else y
     np.savez(tmp_path / "run.npz", voltage=u, displacement=y, sample_period=record.sample_period)
     done = piezo("recalibrate", identified / "model.yaml", tmp_path / "run.npz", "-o", tmp_path / "new.yaml")
     assert done.status == status
@@ -134,7 +136,14 @@ def test_recalibrate_says_whether_its_model_can_be_trusted(piezo, identified, fo
         assert "check stage, columns and units" in done.err and done.err.count("\n") == 1
     else:
         verdict = done.out.splitlines()[-1]
-        assert verdict.startswith("Verdict: ") and ("doubtful" in verdict) == bool(status)
+        assert verdict.startswith("Verdict: ") and ("doubtful" in verdict) == (column == "clipped")
+        assert ("does not describe this stage" in verdict) == bool(status)
+        new = model_file.load(tmp_path / "new.yaml").provenance
+        old = model_file.load(identified / "model.yaml").provenance
+        ratio = float(new["free_run_error"]) / float(old["free_run_error"])
+        assert ratio < 1.0 if column == "same" else ratio > 3.0, "the file states the real error"
+    if column == "same":  # the history before the record is unknown, and hides no gain
+        assert float(re.search(r"gain +([+-][0-9.]+) %", done.out)[1]) == pytest.approx(2.0, abs=0.1)
 
 
 @pytest.mark.parametrize(

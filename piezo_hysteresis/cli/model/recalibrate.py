@@ -18,7 +18,8 @@ from __future__ import annotations
 
 import argparse
 
-from ...discrepancy.changes.recalibration import recalibrate
+from ...discrepancy.changes.moved_group import EXCESS, FULL
+from ...discrepancy.changes.recalibration import Recalibration, recalibrate
 from ...model import model_file
 from ...report.json_file import write_json
 from ...report.words import describes, error_sentence
@@ -51,8 +52,8 @@ def run(args: argparse.Namespace) -> int:
     found = recalibrate(model, experiment)
     path = model_file.save(found.model, args.output)
     if args.json is not None:
-        numbers = ("gain", "loop_height", "lag", "offset", "before", "after")
-        units = ("relative", "relative", "s", "m", "percent_of_range", "percent_of_range")
+        numbers = ("gain", "loop_height", "lag", "offset", "before", "after", "largest", "known")
+        units = ("relative", "relative", "s", "m", *4 * ("percent_of_range",))
         rows = {f"{n}_{u}": getattr(found, n) for n, u in zip(numbers, units, strict=True)}
         write_json(args.json, {"schema": 1, "model": str(path), **rows})
     out = console()
@@ -66,5 +67,15 @@ def run(args: argparse.Namespace) -> int:
     out.print(f"wrote {path}")
     severe = sum(notice.severe for notice in experiment.notices)
     caveat = f" Severe findings in the data make this doubtful: {severe}, see above." if severe else ""
-    out.print(f"Verdict: {error_sentence(found.after)}{caveat}", style="bold")
-    return 0 if describes(found.after) and not severe else 1
+    out.print(f"Verdict: {_judged(found)}{caveat}", style="bold")
+    return 0 if describes(found.after) and found.is_as_good and not severe else 1
+
+
+def _judged(found: Recalibration) -> str:
+    """Whether the new model describes the stage as well as the old one did."""
+    if found.is_as_good or not describes(found.after):
+        return error_sentence(found.after)
+    return (
+        f"The model does not describe this stage: after the fit its error in one record is {found.largest:.3g} % of "
+        f"the range, expected at most {EXCESS:g} times the {found.known:.3g} % that it had; {FULL}."
+    )

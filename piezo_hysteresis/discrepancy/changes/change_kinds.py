@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -132,6 +132,9 @@ class ParameterChange:
         day to day, so V before is smaller than that of the gap.
     session : mapping of str to float
         Relative changes of ``gain`` and ``loop`` that were fitted together with it.
+    also : mapping of str to (float, float, float)
+        Those of them that have changed by more than from day to day: change of the mean slope or of the loop height,
+        and its 95 % interval.
     """
 
     key: str
@@ -141,6 +144,12 @@ class ParameterChange:
     before: float
     after: float
     session: dict[str, float]
+    also: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of everything that has changed, this change first."""
+        return self.kind.name, *(KINDS[key].name for key in self.also)
 
     @property
     def kind(self) -> ChangeKind:
@@ -182,17 +191,27 @@ class ParameterChange:
             rows["lag"] = {"value": lag[0], "interval_95": list(lag[1:]), "unit": "s"}
         return rows
 
-    def row(self, explained: float) -> dict[str, Any]:
-        """The change as an effect of ``answer.json``; `explained` is its share of the gap."""
-        kind = self.kind
-        return {
-            "name": kind.name,
-            "law": kind.name,
-            "family": kind.family,
-            "member_certain": self.member_certain,
+    def rows(self, explained: float) -> list[dict[str, Any]]:
+        """What has changed, as effects of ``answer.json``; together they explain the share `explained` of the gap."""
+        common = {
             "explained_fraction": round(explained, 4),
-            "parameters": self.parameters,
-            "confusable_with": list(self.others),
             "held_out_gain": round(float(np.log(self.before / max(self.after, 1e-12))), 4),
             "changed_parameter": True,
         }
+        found = [_row(self.kind, self.member_certain, self.parameters, self.others) | common]
+        for key, (value, *interval) in self.also.items():
+            kind = KINDS[key]
+            numbers = {kind.parameter: {"value": value, "interval_95": interval, "unit": kind.unit}}
+            found.append(_row(kind, True, numbers, ()) | common)
+        return found
+
+
+def _row(kind: ChangeKind, certain: bool, parameters: dict[str, Any], others: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        "name": kind.name,
+        "law": kind.name,
+        "family": kind.family,
+        "member_certain": certain,
+        "parameters": parameters,
+        "confusable_with": list(others),
+    }

@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -35,6 +36,9 @@ DAY_TO_DAY = {"gain": 0.0075, "loop": 0.04}
 """Standard deviation of the relative changes of gain and loop height from one day to another."""
 PENALTY = 0.5
 """Added to V for a gain or loop height that has changed by one such standard deviation."""
+FARTHEST = 2.0
+"""Largest change from day to day, in these standard deviations. A gain or loop height that differs by more has changed
+itself; beside another change it then costs as much as at this limit, however large it is."""
 SHORTEST, LONGEST = 0.02, 100.0
 """Range of delays and time constants in the search [samples]."""
 SHOWN = 0.3
@@ -47,13 +51,23 @@ AROUND = 0.2
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Account:
-    """One explanation: its cost and its parameters, in the order of `names`."""
+    """One explanation: its cost, the V that remains, its parameters, and the RMS in floors per unit of each.
+
+    The cost is the remaining V and the penalties. Parameters are in the order of `names`.
+    """
 
     key: str
     cost: float
+    left: float
     size: float
     theta: Array
     names: tuple[str, ...]
+    scale: Array
+
+    @property
+    def own(self) -> dict[str, float]:
+        """The parameters by name."""
+        return dict(zip(self.names, self.theta.tolist(), strict=True))
 
 
 class ChangeSearch:
@@ -117,6 +131,7 @@ class ChangeSearch:
         """Least squares for the linear parameters and for a zero in every record, with a change of given size.
 
         Gain and loop height have a penalty that corresponds to their change from day to day, unless they are in `free`.
+        Beside a change it is at most that of the largest such difference, because they may have changed too.
         """
         names = (*self.sides, *(n for n in (KINDS[key].rows if key in KINDS else ())))
         y, columns = self._columns(key, size, names)
@@ -124,21 +139,58 @@ class ChangeSearch:
         target, matrix = self._weighted(self.measured - y, root), self._weighted(columns, root)
         scale = np.linalg.norm(matrix, axis=1)
         scale[scale <= CONSTANT * np.linalg.norm(root * columns, axis=1)] = np.inf
-        penalty = np.zeros(len(matrix))
-        for row, name in enumerate(names):
-            if name in DAY_TO_DAY and name not in free:
-                penalty[row] = PENALTY / DAY_TO_DAY[name] ** 2
-        gram = (matrix / scale[:, None]) @ (matrix / scale[:, None]).T + np.diag(penalty / scale**2)
-        theta = np.linalg.lstsq(gram, (matrix / scale[:, None]) @ target, rcond=1e-12)[0] / scale
-        left = target - theta @ matrix
-        return Account(key, float(left @ left + penalty @ theta**2), size, theta, names)
+        matrix = matrix / scale[:, None]
+        gram, gradient, power = matrix @ matrix.T, matrix @ target, float(target @ target)
+
+        def solved(penalties: Sequence[Array]) -> tuple[float, float, Array]:
+            """Cost, remaining V and parameters with quadratic penalties on some directions."""
+            added = sum((np.outer(row, row) for row in penalties), np.zeros(gram.shape)) / np.outer(scale, scale)
+            found = np.linalg.lstsq(gram + added, gradient, rcond=1e-12)[0]
+            left = float(power - 2.0 * gradient @ found + found @ gram @ found)
+            return left + float(found @ added @ found), left, found / scale
+
+        held = [self._penalties(key, name, names) for name in self.sides if name not in free]
+        most = PENALTY * FARTHEST**2
+        best = min(
+            (
+                (cost + most * sum(not row.any() for row in chosen), left, theta)
+                for chosen in itertools.product(*held)
+                for cost, left, theta in (solved(chosen),)
+            ),
+            key=lambda found: found[0],
+        )
+        return Account(key, best[0], best[1], size, best[2], names, scale)
+
+    def _penalties(self, key: str, name: str, names: Sequence[str]) -> list[Array]:
+        """Directions of the parameters `names` along which gain or loop height may have a penalty; zeros for none.
+
+        A changed loop height comes with the same mean slope, or with the same parameters beside it.
+        """
+        row = np.zeros(len(names))
+        row[names.index(name)] = PENALTY**0.5 / DAY_TO_DAY[name]
+        rows = [row]
+        if name == "gain" and key == "loop":
+            other = row.copy()
+            other[names.index("loop")] = -self.loop_share * row[names.index("gain")]
+            rows.append(other)
+        return rows if key == "none" else [*rows, np.zeros(len(names))]
 
     def session(self, account: Account) -> dict[str, float]:
         """Relative changes of gain and loop height in an account."""
-        own = dict(zip(account.names, account.theta.tolist(), strict=True))
-        numbers = {n: own[n] for n in self.sides}
+        numbers = {n: account.own[n] for n in self.sides}
         numbers["gain"] -= self.loop_share * numbers.get("loop", 0.0)
         return numbers
+
+    def of_equal_records(self, account: Account, floors: Sequence[float]) -> float:
+        """V that an account without change leaves, with equal weights of the records; `floors` of the used records [m].
+
+        A model states its error with these weights. Gain and loop height count as in the cost of the account.
+        """
+        y, columns = self._columns(account.key, account.size, account.names)
+        left = self._weighted(self.measured - y - account.theta @ columns, np.ones(self.measured.size))
+        power = np.add.reduceat(left**2, np.cumsum([0, *self.sizes[:-1]])) / self.sizes
+        moved = sum((account.own[n] / DAY_TO_DAY[n]) ** 2 for n in self.sides)
+        return float(np.mean(power) / np.mean(np.square(floors)) + PENALTY * moved)
 
     def shaped(
         self,
@@ -171,26 +223,26 @@ class ChangeSearch:
             return self.shaped(key, mask, near)
         found = self.account(key, free=(key,), mask=mask)
         rows = KINDS[key].rows or (key,)
-        values = dict(zip(found.names, found.theta.tolist(), strict=True))
-        return Account(key, found.cost, sum(values[r] for r in rows), found.theta, found.names)
+        return replace(found, size=sum(found.own[r] for r in rows))
 
-    def interval(self, best: Account) -> tuple[float, float]:
-        """95 % jackknife interval: the wider one of leaving out groups of pieces and leaving out records.
+    def halves(self, best: Account) -> Array:
+        """Half 95 % jackknife intervals of the size, of gain and of loop height.
 
+        Groups of pieces or records are left out, and the wider one counts.
         A part without which little of the change remains is not used.
         """
         numbers = np.unique(self.labels)
         groups = [g for g in np.array_split(numbers, min(6, numbers.size)) if g.size]
         near = best.size if best.key in SHAPES else None
         whole = self.account("none").cost - best.cost
-        half = 0.0
+        half = np.zeros(1 + len(self.sides))
         for labels, parts in ((self.labels, groups), (self.origins, [[o] for o in np.unique(self.origins)])):
             masks = [~np.isin(labels, part) for part in parts]
             found = [(self.account("none", mask=m).cost, self.best(best.key, m, near)) for m in masks if m.any()]
-            sizes = np.array([rest.size for without, rest in found if without - rest.cost > SHOWN * whole])
-            count = sizes.size
+            kept = [rest for without, rest in found if without - rest.cost > SHOWN * whole]
+            count = len(kept)
             if count > 1:
-                spread = np.sqrt((count - 1.0) / count * np.sum((sizes - sizes.mean()) ** 2))
-                half = max(half, float(scipy.stats.t.ppf(0.975, count - 1)) * float(spread))
-        half = half or np.inf
-        return best.size - half, best.size + half
+                sizes = np.array([[rest.size, *(rest.own[n] for n in self.sides)] for rest in kept])
+                spread = np.sqrt((count - 1.0) / count * np.sum((sizes - sizes.mean(axis=0)) ** 2, axis=0))
+                half = np.maximum(half, float(scipy.stats.t.ppf(0.975, count - 1)) * spread)
+        return np.where(half > 0.0, half, np.inf)

@@ -35,7 +35,7 @@ from ...online.change.false_alarm_threshold import WINDOW, false_alarm_threshold
 from ...online.change.scatter import Scatter, residual_power
 from ...online.change.score import BLOCK_TIME, GROUPS, ChangeScore
 from .minute import Minute
-from .moved_group import FULL, changed_by
+from .moved_group import EXCESS, FULL, changed_by, is_as_good
 
 Array = NDArray[np.float64]
 
@@ -47,8 +47,6 @@ SETTLED = 0.1
 """Largest last step of a converged fit, in standard deviations."""
 TRANSIENT = 0.1
 """Share of the time since a change that is not fitted, because the loop takes its new shape in it."""
-EXCESS = 1.3
-"""Ratio of the RMS residual after the fit to that of the baseline from which the model is not accepted."""
 APART = 0.05
 """Share of a group's weight that must remain after projection on the fitted groups, so that it can be distinguished."""
 SURE = 1.96
@@ -188,7 +186,7 @@ class _Fit:
         before, after = (float(np.sqrt(residual_power(s))) for s in (self._before, found.scores))
         floor = float(np.sqrt(np.mean([self._scatter(s).power for s in self._before])))
         names = " and ".join(groups)
-        if found.remaining or after > EXCESS * floor:
+        if found.remaining or not is_as_good(after, floor):
             left = f", and {found.remaining} still differs" if found.remaining else ""
             raise IdentificationError(
                 f"after a fit of {names} the residual is {1e9 * after:.3g} nm, expected at most {EXCESS:g} times the "

@@ -21,7 +21,7 @@ small changes leave. Other changes that explain as much are its rivals.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,7 +32,7 @@ from ...model.model import Model
 from ...record import Record
 from ..search.cross_validation import ADEQUATE
 from .change_kinds import KINDS, LEAVES, ParameterChange
-from .change_search import Account, ChangeSearch
+from .change_search import DAY_TO_DAY, FARTHEST, Account, ChangeSearch
 from .signatures import AVERAGE, SECOND_ORDER, SHAPES, shaped_model
 
 Array = NDArray[np.float64]
@@ -40,13 +40,11 @@ Array = NDArray[np.float64]
 EXPLAINS = 0.7
 """Largest share of V that a change may leave, relative to V with fitted gain, loop height and zero."""
 NEARLY_ALL = 0.08
-"""Largest share of V that a change may leave if V remains above `LEAVES`."""
+"""Largest share of V that a lag may leave if V remains above `LEAVES`: samples do not show its form between them."""
 SEEN = 0.7
 """Smallest size of a reported change, RMS in floors."""
 RIVAL = 1.15
 """Largest ratio of V for which another change counts as explaining as much."""
-GAIN, LOOP = 0.015, 0.08
-"""Relative changes of gain and loop height that are larger than from day to day."""
 MOVED = (0.9, 0.95, 0.98, 1.02, 1.05, 1.1)
 """Start values of the search for a shifted resonance, relative to its frequency."""
 TURNS = 4
@@ -54,7 +52,8 @@ TURNS = 4
 UNCERTAIN = 0.6
 """Share of the remaining error that can resemble a change. The remaining error counts at least as the floor."""
 FORMS = 6.0
-"""Largest ratio of V for which the lag of another form counts in the interval."""
+"""Largest ratio of V for which the lag of another form counts in the interval. Up to it, another form is a rival if V
+remains above `LEAVES`: what remains is then an error of the form."""
 SURE = 2.5
 """Smallest significant change, in standard errors."""
 
@@ -88,7 +87,7 @@ def find_change(
     """
     search = ChangeSearch(model, records, used, floors)
     day = search.account("none")
-    if day.cost <= ADEQUATE:
+    if _is_known(search, day, floors):
         return None
     keys = [k for k, kind in KINDS.items() if k in SHAPES or (kind.rows and kind.rows[0] in search.predicted[0].rows)]
     first = [k for k in (*search.sides, *keys) if k not in SECOND_ORDER]
@@ -101,29 +100,69 @@ def find_change(
     found = [_Explanation(search, a) for a in accounts]
     if "resonance" in keys and min(e.account.cost for e in found) > LEAVES:
         found.append(_moved_resonance(model, records, used, floors))
+    least = min(e.account.cost for e in found)
+    found = [_simulated(e, model, records, used, floors) if _may_be(e, least) else e for e in found]
     # at similar cost, a delay or a filter of first order comes before one of second order
     found.sort(key=lambda e: e.account.cost * (RIVAL if e.account.key in SECOND_ORDER else 1.0))
-    alike = RIVAL * max(1.0, found[0].account.cost)
-    found[0] = _simulated(found[0], model, records, used, floors)
-    best = found[0].account
-    leaves = best.cost < LEAVES or best.cost < NEARLY_ALL * day.cost
+    most = RIVAL * max(1.0, found[0].account.cost)
+    sides = [e for e in found if e.account.key in DAY_TO_DAY and e.account.cost < most]
+    if found[0] in sides:  # of gain and loop height, the one that is farther from what differs from day to day
+        found.sort(key=lambda e: e is not max(sides, key=lambda s: _in_deviations(s.search, s.account, s.account.key)))
+    best, search = found[0].account, found[0].search
+    leaves = best.left < LEAVES or (best.key in SHAPES and best.left < NEARLY_ALL * day.cost)
     if not (leaves and best.cost < EXPLAINS * day.cost and day.cost - best.cost > SEEN**2):
         return None
-    low, high = found[0].interval(day.cost)
-    half = float(np.hypot(0.5 * (high - low), _spread_of_forms(found)))
-    interval = found[0].size - half, found[0].size + half
-    least = {"gain": GAIN, "loop": LOOP}.get(best.key, 0.0)
+    jackknife, *beside = search.halves(best).tolist()
+    half = float(np.hypot(np.hypot(jackknife, found[0].alike(day.cost)), _spread_of_forms(found)))
     size = found[0].size
-    if not _differs(size, interval) or abs(size) < least:
+    if not _is_sure(size, half) or (best.key in DAY_TO_DAY and abs(size) < FARTHEST * DAY_TO_DAY[best.key]):
         return None
-    near = (e.account.key for e in found[1:] if e.account.cost < alike)
-    rivals = tuple(k for k in dict.fromkeys(near) if k != best.key)
-    return ParameterChange(best.key, size, interval, rivals, day.cost, best.cost, found[0].search.session(best))
+    same = RIVAL if best.left < LEAVES else FORMS
+    near = [e.account.key for e in found[1:] if e.account.cost < same * max(1.0, best.cost)]
+    also = _moved_too(search, best, dict(zip(search.sides, beside, strict=True)))
+    rivals = tuple(k for k in dict.fromkeys(near) if k != best.key and k not in also)
+    interval = size - half, size + half
+    return ParameterChange(best.key, size, interval, rivals, day.cost, best.left, search.session(best), also)
+
+
+def _may_be(found: _Explanation, least: float) -> bool:
+    """Whether a lag may be the change, so that it is worth an exact simulation."""
+    return found.account.key in SHAPES and found.account.cost < FORMS * max(1.0, least)
+
+
+def _in_deviations(search: ChangeSearch, account: Account, name: str) -> float:
+    """Change of gain or loop height in standard deviations of its change from day to day.
+
+    The mean slope and the model's gain differ by the share of the loop; the smaller change counts.
+    """
+    return min(abs(account.own[name]), abs(search.session(account)[name])) / DAY_TO_DAY[name]
+
+
+def _moved_too(
+    search: ChangeSearch, best: Account, halves: Mapping[str, float]
+) -> dict[str, tuple[float, float, float]]:
+    """Gain and loop height that have changed beside `best` by more than from day to day, with 95 % intervals."""
+    found = {}
+    for name, jackknife in halves.items():
+        size = best.own[name]
+        half = float(np.hypot(jackknife, UNCERTAIN * np.sqrt(max(1.0, best.cost)) / best.scale[best.names.index(name)]))
+        if name != best.key and _in_deviations(search, best, name) > FARTHEST and _is_sure(size, half):
+            found[name] = size, size - half, size + half
+    return found
 
 
 def is_unchanged(model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]) -> bool:
-    """Whether day-to-day differences of gain and loop height explain the residual; arguments as `find_change`."""
-    return ChangeSearch(model, records, used, floors).account("none").cost <= ADEQUATE
+    """Whether the differences of a day leave no more than the known error; arguments as `find_change`."""
+    search = ChangeSearch(model, records, used, floors)
+    return _is_known(search, search.account("none"), floors)
+
+
+def _is_known(search: ChangeSearch, day: Account, floors: Sequence[float]) -> bool:
+    """The one criterion for a stage that has not changed, in the measure of the error that a model states.
+
+    With the weights of the search, an unchanged stage may seem to have changed, and a small change may be hidden.
+    """
+    return search.of_equal_records(day, [floors[i] for i in search.used]) <= ADEQUATE
 
 
 def _filters_of_second_order(search: ChangeSearch) -> list[Account]:
@@ -146,13 +185,10 @@ class _Explanation:
         """Size of the change, in the unit of its kind."""
         return self.moved + self.account.size
 
-    def interval(self, before: float) -> tuple[float, float]:
-        """95 % interval of the size; `before` is V without the change."""
-        low, high = self.search.interval(self.account)
+    def alike(self, before: float) -> float:
+        """Half interval of the size due to the remaining error; `before` is V without the change."""
         left = max(1.0, self.account.cost)
-        alike = UNCERTAIN * abs(self.size) * float(np.sqrt(left / max(before - self.account.cost, 1e-12)))
-        half = float(np.hypot(0.5 * (high - low), alike))
-        return self.size - half, self.size + half
+        return UNCERTAIN * abs(self.size) * float(np.sqrt(left / max(before - self.account.cost, 1e-12)))
 
 
 def _simulated(
@@ -168,8 +204,8 @@ def _simulated(
         return found
     search = ChangeSearch(shaped_model(model, key, size), records, used, floors)
     exact = search.shaped(key, near=0.0) if key == "delay" else search.account(key)
-    left = min(found.account.cost, exact.cost)
-    return replace(found, account=replace(found.account, cost=left))
+    least = min(found.account, exact, key=lambda account: account.cost)
+    return replace(found, account=replace(found.account, cost=least.cost, left=least.left))
 
 
 def _spread_of_forms(found: Sequence[_Explanation]) -> float:
@@ -209,6 +245,6 @@ def _moved_resonance(
     return best
 
 
-def _differs(size: float, interval: tuple[float, float]) -> bool:
-    half = 0.5 * (interval[1] - interval[0]) / 1.96 if np.isfinite(interval).all() else np.inf
-    return abs(size) > SURE * half
+def _is_sure(size: float, half: float) -> bool:
+    """Whether a size differs from 0; `half` is half its 95 % interval."""
+    return bool(np.isfinite(half) and abs(size) > SURE * half / 1.96)

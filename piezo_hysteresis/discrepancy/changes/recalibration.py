@@ -16,25 +16,34 @@
 
 Records of one stage differ by about 0.5 % from one day to another. A model of many records with these four new numbers
 predicts better than a new model of one new record.
+
+New records seldom show what the stage did before them, and its hysteresis remembers that until the drive has been at
+both ends of its range. The samples up to there are neither fitted nor part of the errors.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...effects import Offset
 from ...errors import IdentificationError, ParameterError
 from ...identification.fit.normal_equations import Nuisance, residuals
+from ...identification.records.conditioning_split import conditioning_length, covers
 from ...model.model import Model
-from ...model.provenance import provenance
-from ...record import Experiment
+from ...model.provenance import LARGEST, largest_error, provenance
+from ...record import CONDITIONING, Experiment, Record
 from ..excitation_check import check_motion, moves
 from ..residual.noise_floor import floors, stroke
 from .change_kinds import ParameterChange
 from .change_search import ChangeSearch
-from .same_stage import changed_model
+from .moved_group import is_as_good
+from .same_stage import ERROR, changed_model
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -53,6 +62,11 @@ class Recalibration:
         Reading at zero displacement [m].
     before, after : float
         Free-run error with the zero fitted in every record [% of range].
+    largest : float
+        Largest error of one record with the new model [% of range].
+    known : float
+        The same of the old model, as it states it, or the noise floor of the records if it is larger [% of range]; 0 if
+        it states none. A mean over kinds of drive is no measure for new records of one kind.
     """
 
     model: Model
@@ -62,6 +76,13 @@ class Recalibration:
     offset: float
     before: float
     after: float
+    largest: float
+    known: float
+
+    @property
+    def is_as_good(self) -> bool:
+        """Whether the new model is as good as the old one was, by the criterion of the recalibration while running."""
+        return not self.known or is_as_good(self.largest, self.known)
 
 
 def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
@@ -87,44 +108,63 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     ModelError
         If the records are faster than the model.
     """
-    records = experiment.records
-    used = [i for i, r in enumerate(records) if moves(r)]
+    records = _after_a_loop(experiment.records)
+    used = [i for i, r in enumerate(records) if moves(r) and r.phase != CONDITIONING]
     used = [i for i in used if not records[i].truncated] or used
     check_motion("recalibrate", [records[i] for i in used])
-    search = ChangeSearch(model, records, used, floors(records).tolist())
+    least = floors(records)
+    search = ChangeSearch(model, records, used, least.tolist())
     best = search.shaped("delay", free=search.sides)
     best = min((best, search.account("none", free=search.sides)), key=lambda account: account.cost)
     session = search.session(best)
     change = ParameterChange("delay", best.size, (best.size, best.size), (), best.cost, best.cost, session)
+
+    def zeroed(candidate: Model) -> Model:
+        bare = candidate.without(Offset.name)
+        left = residuals(bare, records)
+        old = candidate[Offset.name] if Offset.name in candidate else Offset()
+        return bare.with_effect(old.with_values(y0=float(np.mean([np.mean(left[i]) for i in used]))))
+
     try:
-        fitted = changed_model(model, change, records)
+        fitted = zeroed(changed_model(model, change, records))
     except ParameterError as reason:
         raise IdentificationError(
             f"recalibrate: the gain would have to be {1.0 + session.get('gain', 0.0):.3g} times that of the model, "
             f"which is beyond its bounds ({reason}); check stage, columns and units"
         ) from None
 
-    def error(candidate: Model) -> float:
+    def by_record(candidate: Model) -> Array:
         left = residuals(candidate, records, Nuisance(offset=True))
-        return float(np.sqrt(np.mean([np.mean(left[i] ** 2) for i in used])))
+        return np.asarray(np.sqrt([np.mean(left[i] ** 2) for i in used]))
 
-    before, after = error(model), error(fitted)
-    new = fitted if after < before else model
-    bare = new.without(Offset.name)
-    left = residuals(bare, records)
-    zero = float(np.mean([np.mean(left[i]) for i in used]))
-    old = new[Offset.name] if Offset.name in new else Offset()
+    single = by_record(model), by_record(fitted)
+    before, after = (float(np.sqrt(np.mean(s**2))) for s in single)
+    kept = after < before
+    new, by_new = (fitted, single[1]) if kept else (zeroed(model), single[0])
     span = stroke(records)
     rms = min(before, after)
-    origin = provenance(experiment, rms, 100.0 * rms / span)
-    new = replace(bare.with_effect(old.with_values(y0=zero)), provenance={**model.provenance, **origin})
-    kept = after < before
+    origin = {**provenance(experiment, rms, 100.0 * rms / span), **largest_error(by_new.tolist())}
+    stated = float(model.provenance.get(LARGEST, model.provenance.get(ERROR, "0")))
     return Recalibration(
-        new,
+        replace(new, provenance={**model.provenance, **origin}),
         session.get("gain", 0.0) if kept else 0.0,
         session.get("loop", 0.0) if kept else 0.0,
         best.size if kept else 0.0,
-        zero,
+        new[Offset.name]["y0"],
         100.0 * before / span,
         100.0 * rms / span,
+        100.0 * float(by_new.max()) / span,
+        100.0 * max(stated, float(np.sqrt(np.mean(least[used] ** 2)))) / span if stated else 0.0,
     )
+
+
+def _after_a_loop(records: Sequence[Record]) -> tuple[Record, ...]:
+    """The records, cut where the drive has been at both ends of its range, so that the past no longer matters."""
+    cut: list[Record] = []
+    lead: list[Record] = []
+    for record in records:
+        lead = lead if record.continues else []
+        samples = 0 if lead and covers(lead, record) else conditioning_length(record)
+        cut += [replace(record[:samples], phase=CONDITIONING), record[samples:]] if samples else [record]
+        lead = [*lead, record]
+    return tuple(cut)

@@ -32,7 +32,7 @@ from ..diagnosis import Conclusion, Diagnosis
 from ..gap import measure_gap, with_stated_error
 from ..residual.localise import located
 from ..residual.noise_floor import floors, noise_floors, stroke
-from .change_kinds import LEAVES, ParameterChange
+from .change_kinds import KINDS, LEAVES, ParameterChange
 from .parameter_changes import find_change, is_unchanged
 from .signatures import DRIFT_TIME, SHAPES, creep_numbers, loop_numbers, shaped_model
 
@@ -122,12 +122,14 @@ def sentence_of(change: ParameterChange) -> str:
     size = _with_interval([abs(n) for n in numbers] if change.key == "delay" else numbers, kind.unit)
     if kind.is_filter:
         size += f", cut-off frequency {0.5 / np.pi / change.size:.4g} Hz"
-    words = kind.words.format(how="later" if change.size > 0.0 else "earlier", size=size)
+    words = [kind.words.format(how="later" if change.size > 0.0 else "earlier", size=size)]
+    words += [KINDS[key].words.format(size=_with_interval(also, KINDS[key].unit)) for key, also in change.also.items()]
     late = f" It delays slow signals by {_with_interval(change.lag, 's')}." if kind.damping else ""
+    what = ", ".join(f"{k.name} ({k.family})" for k in (kind, *(KINDS[key] for key in change.also)))
     names = change.others
     alike = f" It cannot be distinguished from {' and '.join(names)} in these records." if names else ""
     left = "" if change.after < LEAVES else " The remaining error is above the known error, so the form is not certain."
-    return f"The stage is the same, but {words}: {kind.name} ({kind.family}).{late}{alike}{left}"
+    return f"The stage is the same, but {' and '.join(words)}: {what}.{late}{alike}{left}"
 
 
 def _with_interval(numbers: Sequence[float], unit: str) -> str:

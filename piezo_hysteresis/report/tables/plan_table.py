@@ -45,7 +45,7 @@ def plan_table(found: Plan) -> Table:
         ("preview", f"{found.preview} samples, {1e3 * found.preview * found.sample_period:.3g} ms"),
         ("planned error", error(expected.planned)),
         ("free-run error of the model", error(expected.free_run)),
-        ("part of it from the parameters", error(expected.parameters)),
+        ("uncertainty of the parameters on this path", error(expected.parameters)),
         ("expected error, rms", error(expected.total)),
     )
     return Table("Plan", ("quantity", "value"), rows)
