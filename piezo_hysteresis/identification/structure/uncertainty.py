@@ -92,20 +92,21 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
         mine = [k for k, p in enumerate(counted) if p.origin == origin]
         sizes = np.array([counted[k].record.size for k in mine])
         rms.append(float(np.sqrt(sizes @ left[mine] / sizes.sum())) * floors[origin])
-    values, rows = found.model.values(), {n: found.model.row(n) for n in found.names}
-    bounds = tuple(n for n in found.names if values[n] in (rows[n].lower, rows[n].upper))
+    values = found.model.values()
     if not np.isfinite(covariance).all():
         raise IdentificationError("structure: the inner products of the fit are not finite; check the records")
     assumed = (*SHAPE, SHARE) if mode_is_inferred(found.model) else ()
     stated = [k for k, n in enumerate(found.names) if n not in assumed]
+    names = tuple(found.names[k] for k in stated)
+    rows = {n: found.model.row(n) for n in names}
     return Fit(
         model=found.model,
-        names=tuple(found.names[k] for k in stated),
+        names=names,
         covariance=(covariance + spread)[np.ix_(stated, stated)],
         cost=found.cost,
         rms=tuple(rms),
         nuisances=tuple(found.zeros[[run_of[o]]] for o in origins),
-        at_bounds=bounds,
+        at_bounds=tuple(n for n in names if values[n] in (rows[n].lower, rows[n].upper)),
         converged=found.converged,
         iterations=found.iterations,
     )
