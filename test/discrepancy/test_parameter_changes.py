@@ -68,6 +68,7 @@ def test_another_day_is_not_a_change(model, another_day):
 @pytest.mark.parametrize("samples", [0.1, 2.3, 20.0])
 def test_a_delay_is_found_with_its_size(model, another_day, samples):
     change = change_of(model, replace(another_day, filter_delay=samples * PERIOD))
+    assert change.kind.family == "lag"
     assert change.key == "delay" or "delay" in change.rivals
     assert change.size == pytest.approx(samples * PERIOD, rel=0.03 if samples > 1 else 0.15)
 
