@@ -35,7 +35,7 @@ from .diagnosis_state import DiagnosisState
 from .passes import PASSES
 from .search.execution.cores import using_cores
 
-DIVERGES = "given_model_diverges"
+GIVEN_DIVERGES = "given_model_diverges"
 """Kind of the notice that the given model is not used."""
 
 
@@ -118,7 +118,7 @@ def diagnose(
 def _without_given_model(state: DiagnosisState, error: DivergenceError) -> DiagnosisState:
     """Continue with a model identified from the records, because the given one diverges on them."""
     said = f"the given model diverges on these records ({error}); the diagnosis begins with one identified from them"
-    return replace(state, model=None, experiment=state.experiment.noting(Notice(DIVERGES, said)))
+    return replace(state, model=None, experiment=state.experiment.noting(Notice(GIVEN_DIVERGES, said)))
 
 
 def compared_with_given(found: Diagnosis) -> Diagnosis:

@@ -21,7 +21,7 @@ import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy import diagnose
-from piezo_hysteresis.discrepancy.diagnose import DIVERGES
+from piezo_hysteresis.discrepancy.diagnose import GIVEN_DIVERGES
 from piezo_hysteresis.discrepancy.diagnosis import Conclusion, Verdict
 from piezo_hysteresis.discrepancy.passes import RESAMPLED
 from piezo_hysteresis.effects import Arx, BoucWen, Softening
@@ -59,5 +59,5 @@ def test_a_given_model_that_diverges_is_replaced_by_an_identified_one(frequencie
     with pytest.raises(DivergenceError):
         unstable.free_run(experiment)
     found = diagnose(experiment, unstable)
-    assert [n.kind for n in found.experiment.notices].count(DIVERGES) == 1
+    assert [n.kind for n in found.experiment.notices].count(GIVEN_DIVERGES) == 1
     assert found.gap.after < 0.5

@@ -143,23 +143,16 @@ class ChangeSearch:
         gram, gradient, power = matrix @ matrix.T, matrix @ target, float(target @ target)
 
         def solved(penalties: Sequence[Array]) -> tuple[float, float, Array]:
-            """Cost, remaining V and parameters with quadratic penalties on some directions."""
+            """Cost, remaining V and parameters with quadratic penalties on some directions, a fixed one without any."""
             added = sum((np.outer(row, row) for row in penalties), np.zeros(gram.shape)) / np.outer(scale, scale)
             found = np.linalg.lstsq(gram + added, gradient, rcond=1e-12)[0]
             left = float(power - 2.0 * gradient @ found + found @ gram @ found)
-            return left + float(found @ added @ found), left, found / scale
+            moved = PENALTY * FARTHEST**2 * sum(not row.any() for row in penalties)
+            return left + float(found @ added @ found) + moved, left, found / scale
 
         held = [self._penalties(key, name, names) for name in self.sides if name not in free]
-        most = PENALTY * FARTHEST**2
-        best = min(
-            (
-                (cost + most * sum(not row.any() for row in chosen), left, theta)
-                for chosen in itertools.product(*held)
-                for cost, left, theta in (solved(chosen),)
-            ),
-            key=lambda found: found[0],
-        )
-        return Account(key, best[0], best[1], size, best[2], names, scale)
+        cost, left, theta = min(map(solved, itertools.product(*held)), key=lambda found: found[0])
+        return Account(key, cost, left, size, theta, names, scale)
 
     def _penalties(self, key: str, name: str, names: Sequence[str]) -> list[Array]:
         """Directions of the parameters `names` along which gain or loop height may have a penalty; zeros for none.

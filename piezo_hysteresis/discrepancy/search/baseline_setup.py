@@ -139,7 +139,6 @@ def prepare_baseline(
         Whether the inter-sample error is corrected.
     progress : callable
         Called with a message and the fraction done.
-
     """
     progress("baseline", 0.1)
     records = tuple(slowed(r) for r in given)

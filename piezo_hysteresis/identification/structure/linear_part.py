@@ -143,7 +143,7 @@ def held_by(fit: PieceFit) -> tuple[str, ...]:
 
 
 def mode_is_inferred(model: Model) -> bool:
-    """Whether a mode stands for a gain that rises with frequency, with an assumed damping, because it does not ring."""
+    """Whether a mode stands for a gain that changes with frequency, with assumed damping, because it does not ring."""
     return ExtraResonance.name in model and model[ExtraResonance.name]["zeta"] == SILENT_DAMPING
 
 

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,7 @@ FEWEST = 12
 """Smallest number of such samples."""
 LONGEST = 0.95
 """Largest radius of the poles of a decay; a longer one is the work of a mode that the samples show, or creep."""
-ALIKE = 1.25
+SAME_LINE = 1.25
 """Ratio of two frequencies up to which they are one line."""
 LINES = 3
 """Largest number of lines."""
@@ -71,7 +71,7 @@ def ringing_lines(model: Model, pieces: Sequence[RecordPiece]) -> list[tuple[flo
         Frequency of every line [Hz], and the kind of the piece that shows it.
     """
     lines: list[tuple[float, float, Kind]] = []
-    for kind, record, echoes in _echoes(model, pieces):
+    for kind, record, echoes in _echoes(model, pieces, (Kind.STEP, Kind.LOOP), 4 * CYCLES):
         longest = max(e.size for e in echoes)
         size = 8 * longest
         frequency = np.fft.rfftfreq(size, record.sample_period)
@@ -89,26 +89,32 @@ def ringing_lines(model: Model, pieces: Sequence[RecordPiece]) -> list[tuple[flo
             lines.append((height, float(frequency[top]), kind))
     found: list[tuple[float, Kind]] = []
     for _, line, kind in sorted(lines, key=lambda one: -one[0]):
-        if all(max(line / other, other / line) > ALIKE for other, _ in found):
+        if all(max(line / other, other / line) > SAME_LINE for other, _ in found):
             found.append((line, kind))
     return found[:LINES]
 
 
-def _echoes(model: Model, pieces: Sequence[RecordPiece]) -> list[tuple[Kind, Record, list[Array]]]:
-    """Kind, record and residuals after a step, or between sharp turns, of every piece that has any."""
+def _echoes(
+    model: Model, pieces: Sequence[RecordPiece], kinds: Collection[Kind], fewest: float
+) -> list[tuple[Kind, Record, list[Array]]]:
+    """Kind, record and residuals after a step, or between sharp turns, of every piece of `kinds` that has any.
+
+    Residuals of fewer than `fewest` samples are left out.
+    """
     found: list[tuple[Kind, Record, list[Array]]] = []
-    records = [p.record for p in pieces]
-    if not any(p.kind in (Kind.STEP, Kind.LOOP) for p in pieces):
+    if not any(p.kind in kinds and p.record.size >= fewest for p in pieces):
         return found
+    records = [p.record for p in pieces]
     most = STRAIGHT * max(float(np.abs(r.voltage).max()) for r in records)
     for piece, y in zip(pieces, model.free_run(records), strict=True):
-        echoes, drive = [piece.record.displacement - y], piece.record.voltage
-        if piece.kind is Kind.LOOP and (cuts := _sharp_turns(drive)).size:
-            parts = zip(np.split(echoes[0], cuts), np.split(drive, cuts), strict=True)
-            echoes = [e for e, u in parts if u.size >= 4 * CYCLES and _bend(u) <= most]
-        elif piece.kind is not Kind.STEP:
+        if piece.kind not in kinds:
             continue
-        if echoes := [e for e in echoes if e.size >= 4 * CYCLES]:
+        echoes, drive = [piece.record.displacement - y], piece.record.voltage
+        if piece.kind is Kind.LOOP:
+            cuts = _sharp_turns(drive)
+            parts = zip(np.split(echoes[0], cuts), np.split(drive, cuts), strict=True) if cuts.size else ()
+            echoes = [e for e, u in parts if u.size >= fewest and _bend(u) <= most]
+        if echoes := [e for e in echoes if e.size >= fewest]:
             found.append((piece.kind, piece.record, echoes))
     return found
 
@@ -141,7 +147,7 @@ def decay_after_steps(model: Model, pieces: Sequence[RecordPiece]) -> Array | No
     pieces : sequence of RecordPiece
         Pieces in order.
     """
-    echoes = [e[:ECHO] for _, e in _after_steps(model, pieces, FEWEST)]
+    echoes = [e[:ECHO] for _, _, after in _echoes(model, pieces, (Kind.STEP,), FEWEST) for e in after]
     if not echoes:
         return None
     echoes = [e - e[e.size // 2 :].mean() for e in echoes]
@@ -149,13 +155,3 @@ def decay_after_steps(model: Model, pieces: Sequence[RecordPiece]) -> Array | No
     after = np.concatenate([e[2:] for e in echoes])
     decay = np.append(1.0, -np.linalg.lstsq(before, after, rcond=None)[0])
     return decay if np.abs(np.roots(decay)).max(initial=0.0) < LONGEST else None
-
-
-def _after_steps(model: Model, pieces: Sequence[RecordPiece], fewest: float) -> list[tuple[Record, Array]]:
-    """Records and residuals of the pieces after steps that have at least `fewest` samples."""
-    steps = [p.kind is Kind.STEP and p.record.size >= fewest for p in pieces]
-    if not any(steps):
-        return []
-    records = [p.record for p in pieces]
-    runs = zip(records, model.free_run(records), steps, strict=True)
-    return [(record, record.displacement - y) for record, y, is_step in runs if is_step]
