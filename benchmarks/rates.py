@@ -37,6 +37,7 @@ from piezo_hysteresis.identification.identification import Identification
 from piezo_hysteresis.identification.identified_range import LAG_ERROR
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.steps.remaining_lag import error_of_lag, lag
+from piezo_hysteresis.identification.structure.linear_part import lag_of_mode, mode_is_inferred
 from piezo_hysteresis.record import Experiment
 
 PERIOD = 5e-4
@@ -85,9 +86,8 @@ def lag_holds(found: Identification, stage: Nanopositioner) -> bool:
     """Whether the 95 % interval of the lag of delay, mode and dynamics holds that of the samples of the stage."""
     value, error = lag(found.fit)
     model = found.model
-    if ExtraResonance.name in model:
-        mode = model[ExtraResonance.name]
-        value += mode["r"] * 2.0 * mode["zeta"] / (2.0 * np.pi * mode["f0"])
+    if ExtraResonance.name in model and not mode_is_inferred(model):  # that of an inferred mode is part of the lag
+        value += lag_of_mode(model)["lag"] * model.sample_period
     return abs(value - stage.sampled_lag(PERIOD)) < 1.96 * error
 
 

@@ -34,6 +34,7 @@ from .steps.delay import Delay
 from .steps.dynamics import Dynamics
 from .steps.order_choice import OrderError
 from .steps.three_steps import ThreeSteps
+from .structure.linear_part import assumed_numbers
 from .structure.structure_choice import StructureChoice
 
 CORRELATED = 0.95
@@ -190,9 +191,11 @@ class Identification:
         lag = arx.group_delay * self.model.sample_period
         lines.append(f"G: {orders}, dc gain {arx.dc_gain:.5g} (fixed), lag {lag * 1e6:.4g} µs")
         lines.append(scale_note(self.model))
+        assumed = assumed_numbers(self.model)
         for name, value in self.fit.values.items():
             if not name.startswith(f"{Arx.name}.") or name == f"{Arx.name}.delay":
-                lines.append(f"{name:28s} {value:12.4g} ± {1.96 * self.fit.standard_errors[name]:.2g} (95 %)")
+                sure = "" if name in assumed else f" ± {1.96 * self.fit.standard_errors[name]:.2g} (95 %)"
+                lines.append(f"{name:28s} {value:12.4g}{sure}")
         for phase in self.phases:
             message = "" if phase.is_fitted else "  not fitted"
             lines.append(f"{phase.phase:28s} {phase.percent:9.4f} % of range {phase.rms * 1e9:10.4g} nm{message}")

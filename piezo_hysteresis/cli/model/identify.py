@@ -23,6 +23,7 @@ from ...effects import MEMORY, OPERATORS, PublishedBoucWen
 from ...identification.identification import Identification, undetermined
 from ...identification.identify import identify
 from ...identification.records.roles import HELD_OUT
+from ...identification.structure.linear_part import assumed_numbers
 from ...model import model_file
 from ...model.axes_samples import has_several_drives
 from ...report.json_file import write_json
@@ -129,7 +130,9 @@ def verdict_line(found: Identification) -> str:
 
 def answer(found: Identification, path: str) -> dict[str, Any]:
     """The result for machines."""
-    fit = found.fit
+    fit, assumed = found.fit, assumed_numbers(found.model)
+    unsure = {*fit.at_bounds, *assumed}
+    values = found.model.values()
     return {
         "schema": 1,
         "model": path,
@@ -137,11 +140,11 @@ def answer(found: Identification, path: str) -> dict[str, Any]:
         "effects": [e.name for e in found.model.effects],
         "parameters": {
             name: {
-                "value": value,
-                "interval_95": None if name in fit.at_bounds else fit.interval(name),
+                "value": values[name],
+                "interval_95": None if name in unsure else fit.interval(name),
                 "at_bound": name in fit.at_bounds,
             }
-            for name, value in fit.values.items()
+            for name in dict.fromkeys((*fit.names, *assumed))
         },
         "delay_s": None if found.delay is None else found.delay.time,
         "correlated": [list(pair) for pair in found.correlated],

@@ -24,6 +24,7 @@ from ...effects import Arx, ExtraResonance
 from ...record import Notice
 from ..fit.fit import Fit
 from ..records.excitation_content import ExcitationContent, moving
+from ..structure.linear_part import lag_of_mode, mode_is_inferred
 from .linear_start import dynamics_of
 
 ONE_FREQUENCY = 4
@@ -33,12 +34,16 @@ STATED = 0.01
 
 
 def lag(fit: Fit) -> tuple[float, float]:
-    """Group delay of G at low frequency and its standard error [s], from the covariance of its coefficients."""
+    """Group delay of G at low frequency and its standard error [s], from the covariance of its coefficients.
+
+    The lag of an inferred mode is part of it, because the data determine only both together.
+    """
     names = [n for n in fit.names if n.startswith(f"{Arx.name}.")]
 
     def at(values: dict[str, float]) -> float:
         model = fit.model.with_values(values)
-        return dynamics_of(model).group_delay * model.sample_period
+        samples = dynamics_of(model).group_delay + (lag_of_mode(model)["lag"] if mode_is_inferred(model) else 0.0)
+        return samples * model.sample_period
 
     steps = {n: max(1e-6 * abs(fit.values[n]), 1e-12) for n in names}
     value = at({})
@@ -76,7 +81,9 @@ def lag_notices(fit: Fit, contents: Sequence[ExcitationContent], *, rivals_count
     highest = max([c.bandwidth for c in driven if not c.is_step] or [0.0])
     ends = f"no record is broadband and the drive ends at {highest:.3g} Hz" if highest else "no record is broadband"
     known_to = np.arcsin(STATED * np.sqrt(2.0)) / (np.pi * 1.96 * error) if error > 0.0 else np.inf
-    besides = " besides the mode" if ExtraResonance.name in fit.model else ""
+    besides = ""
+    if ExtraResonance.name in fit.model:
+        besides = " together with the mode" if mode_is_inferred(fit.model) else " besides the mode"
     notices = [
         Notice(
             "lag_only",

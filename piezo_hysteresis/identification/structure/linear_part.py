@@ -147,6 +147,18 @@ def mode_is_inferred(model: Model) -> bool:
     return ExtraResonance.name in model and model[ExtraResonance.name]["zeta"] == SILENT_DAMPING
 
 
+def assumed_numbers(model: Model) -> tuple[str, ...]:
+    """Numbers without an interval: those of an inferred mode, and the delay, which depends on its assumed damping."""
+    return (*SHAPE, SHARE, DELAY) if mode_is_inferred(model) else ()
+
+
+def lag_of_mode(model: Model) -> dict[str, float]:
+    """By how much later a mode makes slow signals [samples], as ``lag``, and its derivatives by ``r`` and ``f0``."""
+    mode = model[ExtraResonance.name]
+    by_share = mode["zeta"] / (np.pi * mode["f0"] * model.sample_period)
+    return {"lag": mode["r"] * by_share, "r": by_share, "f0": -mode["r"] * by_share / mode["f0"]}
+
+
 def mode_notices(fit: PieceFit) -> list[Notice]:
     """``ringing`` with the numbers of the mode, if there is one; one that does not ring has the assumed damping."""
     order = fit.model[Arx.name].array("a").size
@@ -162,7 +174,7 @@ def mode_notices(fit: PieceFit) -> list[Notice]:
     else:
         said = (
             f"the gain changes with the frequency of the drive; {shown} a share of {mode['r']:.3g} stands for this, "
-            "but its frequency, damping and share are not determined separately and have no intervals"
+            "but its frequency, damping and share and the delay are not determined separately and have no intervals"
         )
     return [Notice("ringing", said)]
 

@@ -23,7 +23,7 @@ import numpy as np
 from ...effects import MEMORY, Creep
 from ...errors import IdentificationError
 from ..fit.fit import Fit
-from .linear_part import SHAPE, SHARE, mode_is_inferred
+from .linear_part import SHAPE, SHARE, lag_of_mode, mode_is_inferred
 from .piece_fit import DELAY, POLE, Array, PieceFit, free_directions
 from .pieces import Kind, RecordPiece
 from .prior import INDEPENDENT
@@ -65,7 +65,8 @@ def spread_of(full: PieceFit, final: PieceFit, chosen: Judged, judged: Sequence[
 def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float], spread: Array) -> Fit:
     """The fit to pieces as a `Fit`; the variance from the residual is added to `spread`.
 
-    The numbers of an inferred mode have no interval: each depends on the values that were assumed for the others.
+    The numbers of an inferred mode are left out: each depends on the values that were assumed for the others. What the
+    data determine is the lag of delay and mode together, so the covariance of the delay is that of this lag.
     """
     numbers = len(found.names)
     total = found.total
@@ -95,14 +96,18 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
     values = found.model.values()
     if not np.isfinite(covariance).all():
         raise IdentificationError("structure: the inner products of the fit are not finite; check the records")
-    assumed = (*SHAPE, SHARE) if mode_is_inferred(found.model) else ()
-    stated = [k for k, n in enumerate(found.names) if n not in assumed]
+    covariance = covariance + spread
+    stated = list(range(numbers))
+    if mode_is_inferred(found.model):
+        stated = [k for k, n in enumerate(found.names) if n not in (*SHAPE, SHARE)]
+        whole = _whole_lag(found)
+        covariance = whole @ covariance @ whole.T
     names = tuple(found.names[k] for k in stated)
     rows = {n: found.model.row(n) for n in names}
     return Fit(
         model=found.model,
         names=names,
-        covariance=(covariance + spread)[np.ix_(stated, stated)],
+        covariance=covariance[np.ix_(stated, stated)],
         cost=found.cost,
         rms=tuple(rms),
         nuisances=tuple(found.zeros[[run_of[o]]] for o in origins),
@@ -110,6 +115,15 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
         converged=found.converged,
         iterations=found.iterations,
     )
+
+
+def _whole_lag(found: PieceFit) -> Array:
+    """Matrix (q, q) that replaces a change of the delay by that of the lag of delay and mode together."""
+    matrix, place = np.eye(len(found.names)), {n: k for k, n in enumerate(found.names)}
+    slopes = lag_of_mode(found.model)
+    for name in {SHARE, SHAPE[0]} & place.keys() if DELAY in place else ():
+        matrix[place[DELAY], place[name]] = slopes[name.partition(".")[2]]
+    return matrix
 
 
 def _open_forms(found: PieceFit) -> float:

@@ -21,6 +21,7 @@ import numpy as np
 from ...effects import Arx
 from ...identification.fit.fit import Fit
 from ...identification.identification import scale_note
+from ...identification.structure.linear_part import assumed_numbers
 from ...model.model import Model
 from .table import Table
 
@@ -34,7 +35,8 @@ MOST_SHOWN = 4
 def parameter_table(model: Model, fit: Fit | None = None) -> Table:
     """Every scalar parameter of the model, with its 95 % interval if it was fitted; arrays in one row each.
 
-    A parameter at a bound has no interval: the data would move it beyond the bound.
+    A parameter at a bound has no interval: the data would move it beyond the bound. Nor have the numbers of a mode that
+    was inferred from the gain, and the delay beside it: they depend on assumed values.
 
     Parameters
     ----------
@@ -46,6 +48,7 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
     rows = []
     sure = _intervals(model, fit)
     hit = () if fit is None else fit.at_bounds
+    assumed = assumed_numbers(model)
     for effect in model.effects:
         for row in effect.parameters:
             name, value = f"{effect.name}.{row.name}", effect.values[row.name]
@@ -54,7 +57,7 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
                 shown = "fitted in each record" if row.per_record else _numbers(value)
                 rows.append((name, row.symbol, shown, "", row.unit, bounds, row.meaning))
                 continue
-            interval = f"± {sure[name]:.2g}" if name in sure and name not in hit else ""
+            interval = f"± {sure[name]:.2g}" if name in sure and name not in (*hit, *assumed) else ""
             message = f"{bounds}: at a bound" if name in hit else bounds
             rows.append((name, row.symbol, f"{value:.4g}", interval, row.unit, message, row.meaning))
     note = f"{scale_note(model)} Do not compare them with those of a model that has other scales."
