@@ -81,16 +81,18 @@ def lag_notices(fit: Fit, contents: Sequence[ExcitationContent], *, rivals_count
     highest = max([c.bandwidth for c in driven if not c.is_step] or [0.0])
     ends = f"no record is broadband and the drive ends at {highest:.3g} Hz" if highest else "no record is broadband"
     known_to = np.arcsin(STATED * np.sqrt(2.0)) / (np.pi * 1.96 * error) if error > 0.0 else np.inf
-    besides = ""
-    if ExtraResonance.name in fit.model:
-        besides = " together with the mode" if mode_is_inferred(fit.model) else " besides the mode"
+    besides = beyond = ""
+    if mode_is_inferred(fit.model):
+        besides, beyond = " together with the mode", f"above {highest:.3g} Hz, the gain is not known; "
+    elif ExtraResonance.name in fit.model:
+        besides = " besides the mode"
     notices = [
         Notice(
             "lag_only",
             f"{ends}, so only a lag is reported for the dynamics{besides}, "
             f"{1e3 * value:.4g} ms ± {1.96e3 * error:.2g} ms (95 %); above "
             f"{known_to:.2g} Hz, this uncertainty allows an error of more than {100 * STATED:.0f} % of the range; "
-            "record noise or a chirp to identify the dynamics",
+            f"{beyond}record noise or a chirp to identify the dynamics",
         )
     ]
     if max(c.lines for c in driven) <= ONE_FREQUENCY and max(c.bandwidth for c in driven) <= 1.5 * min(

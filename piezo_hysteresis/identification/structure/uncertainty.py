@@ -127,9 +127,12 @@ def _whole_lag(found: PieceFit) -> Array:
 
 
 def _open_forms(found: PieceFit) -> float:
-    """How often `BETWEEN_SAMPLES` counts, squared: for a pole that is not there, and for a share of the mode but 1."""
+    """How often `BETWEEN_SAMPLES` counts, squared: for a pole that is not there, and for a share of the mode but 1.
+
+    The form of an inferred mode is open even beside a pole.
+    """
     values = found.model.values()
-    has_pole = POLE in found.names and values[POLE] < -NO_POLE
+    has_pole = POLE in found.names and values[POLE] < -NO_POLE and not mode_is_inferred(found.model)
     off = values[SHARE] - 1.0 if {SHARE, *SHAPE} <= set(found.names) else 0.0
     return float(not has_pole) + off * off
 
