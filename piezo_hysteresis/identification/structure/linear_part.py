@@ -43,6 +43,11 @@ SILENT = (4.0, 10.0)
 """Start values of the frequency of such a mode, as multiples of the highest drive frequency."""
 DAMPING = 0.02
 """Start value of the damping ratio of a mode."""
+RINGS = 0.3
+"""Largest damping ratio of a mode that rings; with it, every cycle has a seventh of the amplitude of the one before.
+
+A fit that ends with more describes a lag, for which there is a delay and a pole.
+"""
 SILENT_DAMPING = 0.2
 """Damping ratio assumed for a mode that does not ring; its lag is part of the delay."""
 WHOLE = 0.3
@@ -185,7 +190,7 @@ def _with_mode(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[
         mode = ExtraResonance(r=1.0, f0=frequency, zeta=DAMPING)
         rings = fit_structure(plain.model.with_effect(mode), pieces, floors)
         described = _misfit_of(kind, rings, pieces) < RINGING_STAYS * _misfit_of(kind, plain, pieces)
-        if described and rings.cost < found.cost:
+        if described and rings.cost < found.cost and rings.model[ExtraResonance.name]["zeta"] <= RINGS:
             found = rings
     if found is plain or abs(found.model.values()[SHARE] - 1.0) > WHOLE:
         silent = min(_silent(plain, pieces, floors), key=lambda f: f.cost, default=plain)
