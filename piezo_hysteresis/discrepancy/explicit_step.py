@@ -34,7 +34,8 @@ from ..identification.fit.normal_equations import grams
 from ..model.model import Model
 from ..record import Experiment, Notice, Record
 from .residual.sampling import at_period, is_faster, less
-from .search.candidates import directions, free_numbers
+from .search.candidate_refits import LATER
+from .search.candidates import directions, adjusted_numbers
 from .search.cross_validation import cross_validate
 from .search.refit import FAILURES, joint
 from .search.training_data import TrainingData
@@ -51,8 +52,6 @@ PRESENT, LEFT = 0.7, 0.3
 """Tolerance of the share of the changes in the residual: from 1 before the subtraction, and from 0 after it."""
 TURNS = 4
 """Largest number of iterations."""
-LINEARISATIONS = 9
-"""Largest number of linearisations of a fit."""
 
 
 def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
@@ -105,10 +104,10 @@ def explicit_model(model: Model, training_data: TrainingData, leaves: float = np
         share = _share(model, training_data, changes) if _largest(changes, floors) > SEEN else 0.0
         if abs(share - 1.0) > PRESENT:
             return None
-        cost = joint(model, training_data, LINEARISATIONS).cost
+        cost = joint(model, training_data, LATER).cost
         for _ in range(TURNS):
             freed = replace(training_data, records=less(records, changes))
-            found = joint(model, freed, LINEARISATIONS)
+            found = joint(model, freed, LATER)
             if found.cost > BETTER * cost:
                 return None
             model, before = found.model, changes
@@ -127,7 +126,7 @@ def _largest(changes: Sequence[Array], floors: Array) -> float:
 
 def _share(model: Model, training_data: TrainingData, changes: list[Array]) -> float:
     """Share of the changes in the residual, fitted linearly together with all free parameters of the model."""
-    names = free_numbers(model, training_data)
+    names = adjusted_numbers(model, training_data)
     rows = [c[None, :] for c in changes]
     products = grams(model, training_data.records, names, training_data.nuisance, rows)
     return float(cross_validate(products, training_data.floors, directions(model, names, 1)).step[-1])

@@ -50,15 +50,15 @@ from .search.cross_validation import ADEQUATE, Score
 from .search.execution.cores import start_helpers
 from .search.execution.time_limit import ending_at
 from .search.record_blocks import training_data_of
-from .search.refit import joint
+from .search.refit import LAST, joint
 from .search.selection import select
 from .search.selection_result import Selection, Step, explained
 from .search.structure_steps import structure_steps
 from .search.test_records import choose_test_records
 from .verdict import FEWEST_RECORDS, MORE_MAY_BE_MISSING, conclusion_of, is_explained
 
-LAST, PRECISE = 25, 1e-6
-"""Largest number of linearisations of a fit, and relative decrease of the cost at convergence."""
+SHARP = 1e-6
+"""Relative decrease of the cost at convergence of the baseline: few records take little time."""
 SEARCHED = 20_000
 """Number of samples of a slow record in the search."""
 EXTENDS = 0.1
@@ -114,7 +114,7 @@ def diagnose_few(
     short = shortened(records, SEARCHED)
     training_data = training_data_of(short, fitted, least.tolist(), start)
     null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
-    baseline = joint(with_zero(published), training_data, LAST, PRECISE)
+    baseline = joint(with_zero(published), training_data, LAST, SHARP)
     before = score_model(baseline.model, training_data)
     if before.excess > ADEQUATE:
         start_helpers()  # effects will be searched for

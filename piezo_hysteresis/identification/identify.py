@@ -40,7 +40,7 @@ from .identified_range import LAG_ERROR, identified_range
 from .inputs import check_gauge, experiment_of
 from .one_core import on_one_core
 from .published_steps import delay_of_steps, published_steps
-from .records.conditioning import select
+from .records.conditioning import records_to_fit
 from .records.conditioning_split import known_from_within
 from .records.excitation_content import sensor_noise
 from .records.leading_step import Blocks, steps_apart
@@ -199,7 +199,7 @@ def identify(
         joint, more_notices = choose_memory(joint, records, floors, roles.fitted, roles.loops)
         notices += more_notices
     if structure is None:
-        kept, sizes = select(*used)
+        kept, sizes = records_to_fit(*used)
         joint = with_form_uncertainty(joint, kept, Nuisance(offset=True), sizes, sizes, reach)
     if not roles.broadband:
         notices += lag_notices(joint, [roles.contents[i] for i in roles.fitted], rivals_counted=structure is not None)

@@ -33,7 +33,7 @@ from ...identification.fit.normal_equations import grams
 from ...identification.protocol.phases import ProtocolPhase
 from ...model.model import Model
 from ...record import Record
-from ..search.candidates import directions, free_numbers
+from ..search.candidates import directions, adjusted_numbers
 from ..search.cross_validation import ADEQUATE
 from ..search.refit import FAILURES
 from ..search.training_data import TrainingData
@@ -96,10 +96,10 @@ def _may_show(
     extended: Model, effect: str, model: Model, training_data: TrainingData, records: Sequence[Record], z: float
 ) -> float:
     """Mean square of the possible error of an effect in the later records, with equal weights [m²]."""
-    base = free_numbers(model, training_data)
+    base = adjusted_numbers(model, training_data)
     sizes = [
         n
-        for n in free_numbers(extended, training_data)
+        for n in adjusted_numbers(extended, training_data)
         if n.startswith(f"{effect}.") and extended.row(n).off is not None
     ]
     q = len(base)

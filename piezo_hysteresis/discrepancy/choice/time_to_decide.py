@@ -29,7 +29,7 @@ from ...identification.fit.normal_equations import grams
 from ...identification.protocol.phases import ProtocolPhase
 from ...model.model import Model
 from ...record import Record
-from ..search.candidates import FittedCandidate, free_numbers, weighted_sum
+from ..search.candidates import FittedCandidate, adjusted_numbers, weighted_sum
 from ..search.training_data import TrainingData
 
 ERROR_RATE, LONGEST = 0.005, 600.0
@@ -158,7 +158,7 @@ def distances(
     drives : mapping of str to Record
         Drives from rest; their displacement is not used.
     """
-    free = free_numbers(first, training_data)
+    free = adjusted_numbers(first, training_data)
     directions = gauge(first, free)
     known = weighted_sum(grams(first, training_data.records, free, training_data.nuisance), training_data.floors)
     prior = directions.T @ known[:-1, :-1] @ directions

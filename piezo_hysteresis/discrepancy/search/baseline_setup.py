@@ -30,7 +30,7 @@ from ...effects.extent import Extent
 from ...errors import DivergenceError
 from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.normal_equations import Nuisance
-from ...identification.records.conditioning import select as select_records
+from ...identification.records.conditioning import records_to_fit
 from ...model.model import Model
 from ...record import Record
 from ..residual.intersample_error import intersample_error
@@ -99,12 +99,12 @@ class BaselineSetup:
     @property
     def whole(self) -> tuple[Record, ...]:
         """The training records of the last fit, averaged or cut to about `FITTED` samples where they are longer."""
-        return tuple(select_records(shortened(self.records, FITTED), self.least.tolist(), self.fitted)[0])
+        return tuple(records_to_fit(shortened(self.records, FITTED), self.least.tolist(), self.fitted)[0])
 
     @property
     def whole_noise(self) -> Array:
         """Noise of those records [m]; infinite for a record that only determines the state of the stage."""
-        return np.array(select_records(self.records, self.noise.tolist(), self.fitted)[1])
+        return np.array(records_to_fit(self.records, self.noise.tolist(), self.fitted)[1])
 
     def changes_intersample_error(self, model: Model) -> bool:
         """Whether the inter-sample error computed with this model differs by more than the floor of a record."""
@@ -157,7 +157,7 @@ def prepare_baseline(
     unfitted = start if earlier is None else earlier.start
 
     def gathered(records: Sequence[Record], least: Array) -> TrainingData:
-        kept, sizes = select_records(shortened(records, SEARCHED), least.tolist(), fitted)
+        kept, sizes = records_to_fit(shortened(records, SEARCHED), least.tolist(), fitted)
         return TrainingData(tuple(kept), np.array(sizes), Nuisance(), extent, start=unfitted)
 
     training_data = gathered(records, least)

@@ -78,7 +78,7 @@ class FittedCandidate(Candidate):
     fit: Fit
 
 
-def free_numbers(model: Model, training_data: TrainingData) -> list[str]:
+def adjusted_numbers(model: Model, training_data: TrainingData) -> list[str]:
     """Parameters that a joint fit adjusts: all except fixed ones, the delay, and those that are free per record.
 
     `settling` of the offset is not adjusted if all records start at one level, because the data do not determine it.
@@ -125,7 +125,7 @@ def score_baseline(model: Model, training_data: TrainingData) -> tuple[TrainingD
 
 
 def _products(model: Model, training_data: TrainingData) -> tuple[list[Gram], Array, Array, tuple[Array, Array]]:
-    names = free_numbers(model, training_data)
+    names = adjusted_numbers(model, training_data)
     products = grams(model, training_data.records, names, training_data.nuisance)
     columns = directions(model, names)
     return products, training_data.floors, columns, room_of(model, names, columns)
@@ -137,7 +137,7 @@ def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Eff
     Effects that are off at their start share one pass over the data. An effect with a finite start is represented by
     the change that it makes.
     """
-    base = free_numbers(model, training_data)
+    base = adjusted_numbers(model, training_data)
     starts = [
         (effect, effect.starts(training_data.extent)) for effect in effects if _fits(model, training_data, effect)
     ]
@@ -177,7 +177,7 @@ def _screen_off(model: Model, training_data: TrainingData, base: list[str], memb
             extended = trial
         except ModelError:
             members = [m for m in members if m is not effect]
-    own = {e.name: [n for n in free_numbers(extended, training_data) if n.startswith(f"{e.name}.")] for e in members}
+    own = {e.name: [n for n in adjusted_numbers(extended, training_data) if n.startswith(f"{e.name}.")] for e in members}
     names = base + [n for e in members for n in own[e.name]]
     products = grams(extended, training_data.records, names, training_data.nuisance)
     columns = directions(model, base, len(names) - len(base))

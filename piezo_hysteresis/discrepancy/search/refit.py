@@ -32,7 +32,7 @@ from ...identification.steps.dynamics import Dynamics, identify_arx
 from ...identification.steps.linear_start import FEW_ITERATIONS, ITERATIONS, form_of, hysteresis_signals, with_dynamics
 from ...identification.steps.modes import identify_modes
 from ...model.model import Model
-from .candidates import Candidate, FittedCandidate, free_numbers, score_model
+from .candidates import Candidate, FittedCandidate, adjusted_numbers, score_model
 from .cross_validation import Score
 from .execution.cores import on_cores
 from .execution.time_limit import check_time
@@ -86,7 +86,7 @@ def joint(model: Model, training_data: TrainingData, max_iterations: int, tolera
     return fit(
         model,
         training_data.records,
-        free_numbers(model, training_data),
+        adjusted_numbers(model, training_data),
         floors=training_data.floors.tolist(),
         nuisance=training_data.nuisance,
         max_iterations=max_iterations,

@@ -35,6 +35,7 @@ from ...identification.structure.left_out import score_left_out
 from ...identification.structure.linear_part import free_numbers
 from ...identification.structure.piece_fit import fit_pieces
 from ...identification.structure.pieces import pieces_of
+from ...identification.structure.structure_choice import LEADS
 from ...identification.structure.uncertainty import as_fit
 from ...model.model import Model
 from ...record import Record
@@ -43,8 +44,6 @@ from .cross_validation import Score
 from .selection_result import Step
 from .training_data import TrainingData
 
-DECIDES = 0.35
-"""Lead in cross-validation (mean ln R²) from which an effect counts as certain: a factor of 1.2 in the error."""
 ORDER = (
     MEMORY.name,
     ExtraResonance.name,
@@ -68,7 +67,7 @@ def decided(found: Identification) -> list[str]:
     if found.structure is None:
         return []
     leads = found.structure.leads
-    certain = [n for n in ORDER if leads.get(n, 0.0) >= DECIDES and n in found.model]
+    certain = [n for n in ORDER if leads.get(n, 0.0) >= LEADS and n in found.model]
     return [n for n in certain if n != MEMORY.level_term.name or MEMORY.name in certain]
 
 
@@ -139,7 +138,7 @@ def _rivals(
     start = ThermalDrift.starts(training_data.extent)[0]
     drift = _refitted(found.model.without(name).with_effect(start), records, floors, fitted)
     behind = score_left_out(drift.model, records, floors, fitted) - score_left_out(found.model, records, floors, fitted)
-    if behind >= DECIDES:
+    if behind >= LEADS:
         return ()
     score = score_model(drift.model, training_data)
     return (FittedCandidate(drift.model[ThermalDrift.name], training_data, score, drift),)

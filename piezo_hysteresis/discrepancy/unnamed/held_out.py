@@ -31,7 +31,7 @@ from ...identification.fit.bounded_step import bounded_step, room_of
 from ...identification.fit.normal_equations import grams
 from ...identification.records.excitation_content import excitation_content
 from ...model.model import Model
-from ..search.candidates import directions, free_numbers
+from ..search.candidates import directions, adjusted_numbers
 from ..search.training_data import TrainingData
 
 Array = NDArray[np.float64]
@@ -101,7 +101,7 @@ def held_out(model: Model, training_data: TrainingData, correction: str = "") ->
     """
     counted = [i for i, floor in enumerate(training_data.floors) if np.isfinite(floor)]
     rates, amplitudes = rate_and_amplitude_groups(training_data)
-    names = free_numbers(model, training_data)
+    names = adjusted_numbers(model, training_data)
     columns = directions(model, names)[:-1]
     products = grams(model, training_data.records, names, training_data.nuisance)
     scaled = [products[i].matrix / (products[i].size * training_data.floors[i] ** 2) for i in counted]

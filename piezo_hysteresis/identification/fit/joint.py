@@ -24,7 +24,7 @@ from ...effects import Arx
 from ...errors import IdentificationError
 from ...model.model import Model
 from ...record import Notice, Record
-from ..records.conditioning import select
+from ..records.conditioning import records_to_fit
 from ..steps.dynamics import Dynamics
 from ..steps.hysteresis import hysteresis_numbers
 from ..steps.linear_start import dynamics_behind, dynamics_of, follower, with_dynamics
@@ -53,7 +53,7 @@ def fit_lag(model: Model, records: Sequence[Record], floors: Sequence[float], fi
     fitted : collection of int
         Indices of the records to fit.
     """
-    kept, sizes = select(records, floors, fitted)
+    kept, sizes = records_to_fit(records, floors, fitted)
     loop, gain = hysteresis_numbers(model), dynamics_of(model).dc_gain
     first, own_gain, delay = (f"{Arx.name}.{n}" for n in ("a[0]", "b[0]", "delay"))
     period = model.sample_period
@@ -94,7 +94,7 @@ def fit_joint(
     progress : callable, optional
         Called with a word and the fraction done.
     """
-    kept, sizes = select(records, floors, fitted)
+    kept, sizes = records_to_fit(records, floors, fitted)
     free = hysteresis_numbers(model)
     free += [f"{Arx.name}.{n}" for n in dynamics_of(model).free_names() if n != "delay"]
     return fit(model, kept, free, floors=sizes, nuisance=Nuisance(offset=True), damping=NEAR, progress=progress)
@@ -186,7 +186,7 @@ def _start(
         candidates.append(with_dynamics(model, dynamics.arx))
     except IdentificationError:
         return candidates[0], dynamics
-    kept, sizes = select(records, floors, broadband)
+    kept, sizes = records_to_fit(records, floors, broadband)
 
     def cost(candidate: Model) -> float:
         errors = residuals(candidate, kept, Nuisance(offset=True))

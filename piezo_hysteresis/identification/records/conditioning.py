@@ -34,7 +34,7 @@ def with_conditioning(records: Sequence[Record], wanted: Collection[int]) -> lis
     return sorted(needed)
 
 
-def select(
+def records_to_fit(
     records: Sequence[Record], floors: Sequence[float], wanted: Collection[int]
 ) -> tuple[list[Record], list[float]]:
     """Records for a fit, and their noise floors.

@@ -28,7 +28,7 @@ from ...model.model import Model
 from ...record import Record
 from ..fit.fit import Fit, fit
 from ..fit.normal_equations import Nuisance
-from ..records.conditioning import select
+from ..records.conditioning import records_to_fit
 
 
 def loop_of(record: Record, model: Model, weight: float = 1.0) -> Loop:
@@ -78,7 +78,7 @@ def fit_hysteresis(model: Model, records: Sequence[Record], loops: Collection[in
     Fit
         Fit of the hysteresis parameters to all samples.
     """
-    kept, floors = select(records, [1.0] * len(records), loops)
+    kept, floors = records_to_fit(records, [1.0] * len(records), loops)
     loops_ = [loop_of(r, model, float(np.isfinite(f))) for r, f in zip(kept, floors, strict=True)]
     model = model.with_hysteresis(model.hysteresis.started(loops_))
     return fit(model, kept, hysteresis_numbers(model), floors=floors, nuisance=Nuisance(offset=True))

@@ -32,7 +32,7 @@ from ...model.model import Model
 from ...record import Notice, Record
 from ..fit.fit import Fit, fit
 from ..fit.normal_equations import Nuisance, residuals
-from ..records.conditioning import select
+from ..records.conditioning import records_to_fit
 from .hysteresis import fit_hysteresis
 
 Array = NDArray[np.float64]
@@ -102,7 +102,7 @@ def choose_memory(
     plays = with_plays(joint.model, records)
     if plays is None:
         return joint, ()
-    blocks, sizes = _blocks(*select(records, floors, loops))
+    blocks, sizes = _blocks(*records_to_fit(records, floors, loops))
     state_error = left_out(blocks, sizes, lambda used: fit_hysteresis(joint.model, blocks, used).model)
     plays_error = left_out(blocks, sizes, lambda used: _fit_plays(plays, blocks, used))
     # with the mean of logarithms, a single bad block does not decide
@@ -120,7 +120,7 @@ def choose_memory(
         if clear
         else "the data do not decide, and play operators predict other loops better"
     )
-    kept, kept_floors = select(records, floors, fitted)
+    kept, kept_floors = records_to_fit(records, floors, fitted)
     free = [*linear_numbers(plays), *(n for n in joint.names if n.startswith(f"{Arx.name}."))]
     found = fit(plays, kept, free, floors=kept_floors, nuisance=Nuisance(offset=True))
     return found, (Notice("memory", f"{message}; {because}, so {MEMORY.name} is used"),)
@@ -149,7 +149,7 @@ def left_out(blocks: Sequence[Record], floors: Sequence[float], fitted_to: Calla
 
 
 def _fit_plays(model: Model, blocks: Sequence[Record], used: Collection[int]) -> Model:
-    kept, sizes = select(blocks, [1.0] * len(blocks), used)
+    kept, sizes = records_to_fit(blocks, [1.0] * len(blocks), used)
     return fit(model, kept, linear_numbers(model), floors=sizes, nuisance=Nuisance(offset=True)).model
 
 

@@ -17,7 +17,7 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.search.candidates import free_numbers
+from piezo_hysteresis.discrepancy.search.candidates import adjusted_numbers
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, BoucWen, Offset
 from piezo_hysteresis.effects.extent import Extent
@@ -34,5 +34,5 @@ def test_settling_is_free_only_where_records_begin_at_different_levels(begins, f
     training_data = TrainingData(
         records, np.ones(2), Nuisance(), Extent.of(records, STAGE.voltage_scale, STAGE.displacement_scale)
     )
-    assert ("offset.settling" in free_numbers(STAGE, training_data)) is free
-    assert "offset.y0" in free_numbers(STAGE, training_data)
+    assert ("offset.settling" in adjusted_numbers(STAGE, training_data)) is free
+    assert "offset.y0" in adjusted_numbers(STAGE, training_data)
