@@ -75,12 +75,12 @@ def concluded(
     records, least, training_data = setup.records, setup.least, setup.training_data
     progress("gap", 0.85)
     named = is_explained(selection)
-    whole = setup.whole
-    first = joint(selection.baseline, replace(training_data, records=whole), LAST, PRECISE)
+    whole = setup.for_last_fit(training_data)
+    first = joint(selection.baseline, whole, LAST, PRECISE)
     final, final_training_data = first, training_data
     if named:
         final_training_data = selection.accepted[-1].best.training_data
-        final = _finished(selection, replace(final_training_data, records=whole), setup.null)
+        final = _finished(selection, replace(final_training_data, records=whole.records))
     unseen = tuple(setup.test_records)
 
     def gap_of(last: Fit, nuisance: Nuisance) -> Gap:
@@ -103,7 +103,7 @@ def concluded(
             diverges, unseen = True, ()
             gap = gap_of(first, training_data.nuisance)
     final = with_form_uncertainty(
-        final, whole, final_training_data.nuisance, final_training_data.floors, setup.whole_noise, setup.span
+        final, whole.records, final_training_data.nuisance, final_training_data.floors, setup.whole_noise, setup.span
     )
     progress("next experiment", 0.95)
     if diverges:
@@ -128,15 +128,15 @@ def concluded(
         gap=gap,
         next_experiment=best_next_experiment(selection, training_data),
         experiment=experiment.noting(*missing_excitation([records[i] for i in setup.usable], found)),
-        correction=best_correction(final.model, setup, selection.null) if is_unexplained else None,
+        correction=best_correction(final.model, setup) if is_unexplained else None,
     )
 
 
-def _finished(selection: Selection, training_data: TrainingData, null: float) -> Fit:
+def _finished(selection: Selection, training_data: TrainingData) -> Fit:
     """The last fit of the named effects; restarted with newly estimated dynamics while this reduces the cost."""
     final = joint(selection.model, training_data, LAST, PRECISE)
     last = selection.accepted[-1].best
-    while final.cost > NOISY * null:
+    while final.cost > NOISY * training_data.null:
         anew = restart(replace(last, effect=final.model[last.name], training_data=training_data, fit=final), LAST).fit
         if anew.cost > WORTHWHILE * final.cost:
             break

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from ..effects import CHAIN
@@ -53,6 +53,9 @@ class Diagnosis(Pictured):
         The model with the named effects; without any, the refitted baseline.
     baseline : Model
         The refitted model without the effects.
+    experiment : Experiment
+        Experiment that was compared with the model, without the noise of a measured voltage. Its notices describe the
+        quality of the data, and the effects that the data cannot show.
     selection : Selection or None
         Every step of the search; None if the data did not allow a search.
     fit : Fit or None
@@ -63,9 +66,6 @@ class Diagnosis(Pictured):
         Free-run error before and after.
     next_experiment : Separation or None
         Drive that would separate two explanations that these data cannot distinguish.
-    experiment : Experiment
-        Experiment that was compared with the model, without the noise of a measured voltage. Its notices describe the
-        quality of the data, and the effects that the data cannot show.
     change : ParameterChange or None
         Changed parameter of a given model, if this change explains the records.
     correction : Correction or None
@@ -76,12 +76,12 @@ class Diagnosis(Pictured):
     reason: str
     model: Model | None
     baseline: Model | None
-    selection: Selection | None
-    fit: Fit | None
-    where: tuple[ResidualShare, ...]
-    gap: Gap | None
-    next_experiment: Separation | None
     experiment: Experiment
+    selection: Selection | None = None
+    fit: Fit | None = None
+    where: tuple[ResidualShare, ...] = ()
+    gap: Gap | None = None
+    next_experiment: Separation | None = None
     change: ParameterChange | None = None
     correction: Correction | None = None
 
@@ -145,16 +145,19 @@ class Diagnosis(Pictured):
 
     def _gap(self) -> dict[str, Any]:
         gap = self.gap
+        if gap is None:
+            unknown = dict.fromkeys(("before", "after", "live", "floor", "after_interval_95"))
+            return {**unknown, "unseen": False, "per_phase": {}}
         return {
-            "before": None if gap is None else gap.before,
-            "after": None if gap is None else gap.after,
-            "live": None if gap is None else gap.live,
-            "floor": None if gap is None else gap.floor,
-            "after_interval_95": None if gap is None or gap.interval_95 is None else list(gap.interval_95),
-            "unseen": False if gap is None else gap.unseen,
+            "before": gap.before,
+            "after": gap.after,
+            "live": gap.live,
+            "floor": gap.floor,
+            "after_interval_95": None if gap.interval_95 is None else list(gap.interval_95),
+            "unseen": gap.unseen,
             "per_phase": {
                 f"{p.index:02d}_{p.phase}": {"before": p.before, "after": p.after, "floor": p.floor}
-                for p in (() if gap is None else gap.per_phase)
+                for p in gap.per_phase
             },
         }
 
@@ -174,7 +177,7 @@ class Diagnosis(Pictured):
             "effects": self.effects(),
             "where": [{"axis": p.axis, "share": round(p.share, 4), "detail": p.detail} for p in self.where],
             "gap_percent_of_range": self._gap(),
-            "rejected": [{"name": r.name, "reason": r.reason} for r in self.rejected],
+            "rejected": [asdict(r) for r in self.rejected],
             "next_experiment": None
             if (following := self.next_experiment) is None
             else {
@@ -183,10 +186,7 @@ class Diagnosis(Pictured):
                 "reason": following.sentence(),
                 **following.numbers(),
             },
-            "data_quality": [
-                {"kind": n.kind, "phase": n.phase, "message": n.message, "severe": n.severe}
-                for n in self.experiment.notices
-            ],
+            "data_quality": [asdict(n) for n in self.experiment.notices],
             "unnamed_correction": None if self.correction is None else self.correction.answer(),
             "model": model_file,
         }

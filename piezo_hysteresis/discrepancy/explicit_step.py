@@ -35,7 +35,7 @@ from ..model.model import Model
 from ..record import Experiment, Notice, Record
 from .residual.sampling import at_period, is_faster, less
 from .search.candidate_refits import LATER
-from .search.candidates import directions, adjusted_numbers
+from .search.candidates import adjusted_numbers, directions
 from .search.cross_validation import cross_validate
 from .search.refit import FAILURES, joint
 from .search.training_data import TrainingData

@@ -34,13 +34,13 @@ from .diagnosis import Conclusion, Diagnosis
 from .diagnosis_state import VOLTAGE_NOISE, DiagnosisState
 from .excitation_check import check_motion, moves
 from .explicit_step import KIND, explicit_model, without_steps
+from .single_record import diagnose_few
 from .residual.localise import ResidualShare, located
 from .residual.sampling import NOISE_WIDTH, is_faster, quieted, resampled, voltage_noise
 from .search.baseline_setup import BaselineSetup, prepare_baseline
 from .search.cross_validation import ADEQUATE
 from .search.execution.time_limit import ending_at
 from .search.selection import select
-from .single_record import diagnose_few
 from .unnamed.correction import without_corrections
 from .verdict import FEWEST_RECORDS
 
@@ -92,7 +92,7 @@ def check_data(state: DiagnosisState) -> DiagnosisState | Diagnosis:
         check_motion("diagnose", [experiment[i] for i in state.moving])
         return state
     reason = f"No verdict is possible, because of the data: {severe[0].message}."
-    return Diagnosis(Conclusion.INSUFFICIENT_DATA, reason, model, model, None, None, (), None, None, experiment)
+    return Diagnosis(Conclusion.INSUFFICIENT_DATA, reason, model, model, experiment)
 
 
 def resample_for_the_given_model(state: DiagnosisState) -> DiagnosisState:
@@ -157,7 +157,6 @@ def search_effects(state: DiagnosisState) -> DiagnosisState:
             setup.baseline.model,
             setup.training_data,
             setup.score,
-            setup.null,
             state.effects,
             lambda word, part: state.progress(word, 0.4 + 0.4 * part),
         )
@@ -203,10 +202,8 @@ def _freed(state: DiagnosisState, explicit: Model) -> DiagnosisState | Diagnosis
         "No verdict is possible: the data were simulated with the explicit step of Eq. (7), which no real stage takes. "
         "Diagnose them with --explicit-step (Python: explicit_step=True)."
     )
-    model, where = state.fitted.baseline.model, state.where
-    return Diagnosis(
-        Conclusion.INSUFFICIENT_DATA, reason, model, model, None, None, where, None, None, state.experiment
-    )
+    model = state.fitted.baseline.model
+    return Diagnosis(Conclusion.INSUFFICIENT_DATA, reason, model, model, state.experiment, where=state.where)
 
 
 def conclude(state: DiagnosisState) -> Diagnosis:

@@ -22,6 +22,7 @@ amplitudes are named.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,13 +31,12 @@ from ..effects import Effect
 from ..errors import PiezoError
 from ..identification.fit.fit import Fit, Progress
 from ..identification.fit.normal_equations import Nuisance
-from ..identification.identification import Identification
 from ..identification.identify import identify
 from ..identification.records.conditioning import with_conditioning
 from ..identification.structure.left_out import has_several_drives, score_left_out
 from ..model.model import Model
 from ..model.provenance import provenance
-from ..record import CONDITIONING, Experiment, Notice, Record
+from ..record import Experiment, Notice, Record
 from .diagnosis import Conclusion, Diagnosis
 from .excitation_check import missing_excitation
 from .gap import Gap, measure_gap, with_stated_error
@@ -44,7 +44,7 @@ from .next_experiment import best_next_experiment
 from .residual.localise import located
 from .residual.noise_floor import floors, noise_floors, stroke
 from .residual.sampling import shortened
-from .search.baseline import with_zero
+from .search.baseline import as_conditioning, with_zero
 from .search.candidates import loop_is_off, score_model
 from .search.cross_validation import ADEQUATE, Score
 from .search.execution.cores import start_helpers
@@ -102,7 +102,7 @@ def diagnose_few(
     records = experiment.records
     aside = choose_test_records(records, used) if len(used) >= FEWEST_RECORDS else ()
     fitted = [i for i in used if i not in aside]
-    known = _without(experiment, aside)
+    known = as_conditioning(experiment, aside)
     progress("baseline", 0.1)
     published, found = model, None
     if published is None:  # which records are not fitted was decided above
@@ -112,8 +112,7 @@ def diagnose_few(
     noise = noise_floors(records)
     least = floors(records, noise)
     short = shortened(records, SEARCHED)
-    training_data = training_data_of(short, fitted, least.tolist(), start)
-    null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
+    training_data = training_data_of(short, fitted, noise, least, start)
     baseline = joint(with_zero(published), training_data, LAST, SHARP)
     before = score_model(baseline.model, training_data)
     if before.excess > ADEQUATE:
@@ -126,25 +125,32 @@ def diagnose_few(
     several = has_several_drives(records, fitted)
     if found and found.structure and before.excess > ADEQUATE and several:
         steps = structure_steps(found, before, training_data, short, least.tolist(), fitted)
+    is_certain = bool(steps)
     fitting = [e for e in effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
     with ending_at(end):
-        more = select(
-            now.model, training_data, score, null, fitting, lambda word, part: progress(word, 0.6 + 0.3 * part)
-        )
+        more = select(now.model, training_data, score, fitting, lambda word, part: progress(word, 0.6 + 0.3 * part))
     chosen = sorted(aside or fitted)
-    final, accepted = _delivered(more, now, model, found, records, least.tolist(), fitted, chosen)
-    further = more.steps if accepted else tuple(replace(s, accepted=False) for s in more.steps)
-    reached = more.score if accepted else score
-    selection = Selection(baseline.model, final.model, reached, (*steps, *further), null, more.in_time)
+    free = Nuisance(offset=True)
+    final = _Delivered(start, found.fit if found else None, free)
+    contenders = [] if found else [_Delivered(now.stated_model, now, free)]
+    if more.accepted:
+        last = more.accepted[-1].best
+        contenders.append(_Delivered(last.fit.stated_model, last.fit, last.training_data.nuisance))
+    if contenders:
+        final = _best(final, contenders, records, least.tolist(), fitted, chosen)
+    if more.accepted and final is contenders[-1]:
+        steps, score = [*steps, *more.steps], more.score
+    else:
+        steps = [*steps, *(replace(s, accepted=False) for s in more.steps)]
+    selection = Selection(baseline.model, final.model, score, tuple(steps), more.null, more.in_time)
 
     progress("gap", 0.9)
-    free = Nuisance(offset=True), replace(final.nuisance, offset=True)
     first = model or baseline.model  # the gap of a given model is measured before any refit
-    models = first, final.model
-    gap = measure_gap(models, records, chosen, least.tolist(), stroke(records), free, bool(aside))
+    models, nuisances = (first, final.model), (free, replace(final.nuisance, offset=True))
+    gap = measure_gap(models, records, chosen, least.tolist(), stroke(records), nuisances, bool(aside))
     shown = {s.best.effect.public_name() for s in selection.accepted}
     missing = missing_excitation([records[i] for i in used], shown)
-    conclusion, reason = conclusion_of_few(selection, bool(steps), before, gap, len(used), several, missing)
+    conclusion, reason = conclusion_of_few(selection, is_certain, before, gap, len(used), several, missing)
     delivered = replace(final.model, provenance={**final.model.provenance, **provenance(experiment, 0.0, 0.0)})
     return Diagnosis(
         conclusion=conclusion,
@@ -160,48 +166,26 @@ def diagnose_few(
     )
 
 
-def _without(experiment: Experiment, aside: Collection[int]) -> Experiment:
-    """The experiment in which the test records only determine the state of the stage."""
-    records = tuple(replace(r, phase=CONDITIONING) if i in aside else r for i, r in enumerate(experiment.records))
-    return Experiment(records, experiment.source)
-
-
-def _delivered(
-    more: Selection,
-    now: Fit,
-    given: Model | None,
-    found: Identification | None,
+def _best(
+    start: _Delivered,
+    contenders: Sequence[_Delivered],
     records: Sequence[Record],
     least: Sequence[float],
     fitted: Collection[int],
     tested: Sequence[int],
-) -> tuple[_Delivered, bool]:
-    """The model that predicts rates, amplitudes and records left out best; a given model stays if none is better.
+) -> _Delivered:
+    """The model that predicts rates, amplitudes and records left out best; the start stays if none is better.
 
     A model that diverges on a test record is not taken.
     """
-    free = Nuisance(offset=True)
-    if found is not None:
-        start = _Delivered(found.model, found.fit, free)
-    else:
-        start = _Delivered(given or now.model, None, free)
-    contenders = [] if found is not None else [_Delivered(now.stated_model, now, free)]
-    if more.accepted:
-        last = more.accepted[-1].best
-        contenders.append(_Delivered(last.fit.stated_model, last.fit, last.training_data.nuisance))
-    best, extended = start, False
-    if contenders:
-        reached = score_left_out(start.model, records, least, fitted, adjusts=found is not None)
-        for contender in contenders:
-            try:
-                score = score_left_out(contender.model, records, least, fitted)
-                contender.model.free_run([records[i] for i in with_conditioning(records, tested)])
-            except PiezoError:
-                continue
+    best, reached = start, score_left_out(start.model, records, least, fitted, adjusts=start.fit is not None)
+    for contender in contenders:
+        with suppress(PiezoError):
+            score = score_left_out(contender.model, records, least, fitted)
+            contender.model.free_run([records[i] for i in with_conditioning(records, tested)])
             if score < reached - EXTENDS:
                 best, reached = contender, score
-                extended = bool(more.accepted) and contender is contenders[-1]
-    return best, extended
+    return best
 
 
 def conclusion_of_few(

@@ -33,7 +33,7 @@ from ...identification.fit.normal_equations import grams
 from ...identification.protocol.phases import ProtocolPhase
 from ...model.model import Model
 from ...record import Record
-from ..search.candidates import directions, adjusted_numbers
+from ..search.candidates import adjusted_numbers, directions
 from ..search.cross_validation import ADEQUATE
 from ..search.refit import FAILURES
 from ..search.training_data import TrainingData

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +31,12 @@ from .residual import residuals_on
 Array = NDArray[np.float64]
 Bins = NDArray[np.intp]
 
-EDGES = {
-    "frequency": np.array([0.0, 0.5, 5.0, 25.0, 75.0, 150.0, 250.0, 350.0, 600.0, 1.2e3, 2.5e3, np.inf]),
-    "time_since_level_change": np.concatenate(([0.0], np.geomspace(1e-4, 100.0, 13), [np.inf])),
-}
-"""Edges of the bins along every axis."""
+FREQUENCIES = np.array([0.0, 0.5, 5.0, 25.0, 75.0, 150.0, 250.0, 350.0, 600.0, 1.2e3, 2.5e3, np.inf])
+"""Edges of the bins of frequency [Hz]."""
+REST_TIMES = np.concatenate(([0.0], np.geomspace(1e-4, 100.0, 13), [np.inf]))
+"""Edges of the bins of time since the last change of level [s]."""
+TENTHS = [f"{10 * k} to {10 * k + 10} % of the drive range" for k in range(10)]
+"""Bins of a voltage."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,90 +112,58 @@ def localise(
     total = sum(float(p.sum()) for p in power)
     if total == 0.0:
         return ()
+    end = max(r.start_time + r.duration for r in records)
+    times = [f"{k * end / 10:.3g} to {(k + 1) * end / 10:.3g} s" for k in range(10)]
+    phases = list(dict.fromkeys(r.phase for r in records))
+    spectra = [np.abs(np.fft.rfft(e)) ** 2 / (f * f * e.size**2) for e, f in zip(residuals, floors, strict=True)]
+    frequencies = [np.fft.rfftfreq(r.size, r.sample_period) for r in records]
+    places = [
+        _place(
+            "phase", phases, [np.array([phases.index(r.phase)]) for r in records], [p.sum(keepdims=True) for p in power]
+        ),
+        _place("frequency", _ranges(FREQUENCIES, "g", "Hz"), [_bins(FREQUENCIES, f) for f in frequencies], spectra),
+    ]
     lowest = min(float(r.voltage.min()) for r in records)
     span = max(float(r.voltage.max()) for r in records) - lowest
-    end = max(r.start_time + r.duration for r in records)
-    places = [_phases(records, power), _frequencies(records, residuals, floors)]
-    axes: dict[str, list[Bins]] = {
-        axis: [] for axis in ("amplitude", "direction", "turning_point_distance", "time_since_level_change")
+    drive = [_drive_bins(r, lowest, span) for r in records]
+    labels = {
+        "amplitude": TENTHS,
+        "direction": ["falling drive", "drive at rest", "rising drive"],
+        "turning_point_distance": [f"{tenth} after a turning point" for tenth in TENTHS],
+        "time_since_level_change": [f"{time} after a change of level" for time in _ranges(REST_TIMES, ".2g", "s")],
     }
-    for record in records:
-        for axis, index in _drive_bins(record, lowest, span).items():
-            axes[axis].append(index)
-    for axis, bins in axes.items():
-        places.append(_gather(axis, bins, power, _labels(axis)))
+    places += [_place(axis, names, [bins[axis] for bins in drive], power) for axis, names in labels.items()]
     tenth = [np.minimum((10 * r.time / end).astype(int), 9) for r in records]
-    places.append(
-        _gather("absolute_time", tenth, power, [f"{k * end / 10:.3g} to {(k + 1) * end / 10:.3g} s" for k in range(10)])
-    )
-    concentrations = {place.axis: concentration for place, concentration in places}
-    return tuple(sorted((p for p, _ in places), key=lambda p: -concentrations[p.axis]))
+    places.append(_place("absolute_time", times, tenth, power))
+    return tuple(place for place, _ in sorted(places, key=lambda found: -found[1]))
 
 
-def _gather(
-    axis: str, bins: Sequence[Bins], power: Sequence[Array], labels: Sequence[str]
+def _place(
+    axis: str, labels: Sequence[str], bins: Sequence[Bins], power: Sequence[Array]
 ) -> tuple[ResidualShare, float]:
+    """Shares along one axis, and their concentration: the difference between the shares of power and of samples."""
     held = np.zeros(len(labels))
     room = np.zeros(len(labels))
     for index, p in zip(bins, power, strict=True):
         known = index >= 0
         held += np.bincount(index[known], p[known], len(labels))
         room += np.bincount(index[known], minlength=len(labels)) / p.size
-    return _place(axis, held, room, labels)
-
-
-def _place(axis: str, held: Array, room: Array, labels: Sequence[str]) -> tuple[ResidualShare, float]:
     shares = held / max(held.sum(), 1e-300)
-    even = room / max(room.sum(), 1e-300)
-    excess = shares - even
+    excess = shares - room / max(room.sum(), 1e-300)
     chosen = [k for k in np.argsort(-excess) if excess[k] > 0.25 * max(excess.max(), 1e-12)][:3]
-    share = float(shares[chosen].sum())
     message = ", ".join(f"{labels[k]} ({100 * shares[k]:.0f} %)" for k in chosen)
-    # concentration: difference between the shares of power and of samples
-    concentration = float(np.abs(excess).sum() / 2.0)
-    return ResidualShare(
-        axis, share, message, tuple((n, float(s)) for n, s in zip(labels, shares, strict=True))
-    ), concentration
+    bars = tuple(zip(labels, shares.tolist(), strict=True))
+    return ResidualShare(axis, float(shares[chosen].sum()), message, bars), float(np.abs(excess).sum() / 2.0)
 
 
-def _phases(records: Sequence[Record], power: Sequence[Array]) -> tuple[ResidualShare, float]:
-    names = list(dict.fromkeys(r.phase for r in records))
-    held, room = np.zeros(len(names)), np.zeros(len(names))
-    for record, p in zip(records, power, strict=True):
-        held[names.index(record.phase)] += p.sum()
-        room[names.index(record.phase)] += 1.0
-    return _place("phase", held, room, names)
+def _ranges(edges: Array, form: str, unit: str) -> list[str]:
+    """The bins between edges, as text."""
+    pairs = zip(edges, edges[1:], strict=False)
+    return [f"{a:{form}} {unit} or more" if np.isinf(b) else f"{a:{form}} to {b:{form}} {unit}" for a, b in pairs]
 
 
-def _frequencies(
-    records: Sequence[Record], residuals: Sequence[Array], floors: Sequence[float]
-) -> tuple[ResidualShare, float]:
-    edges = EDGES["frequency"]
-    labels = [_between(f"{a:g}", f"{b:g}", "Hz") for a, b in zip(edges, edges[1:], strict=False)]
-    held, room = np.zeros(len(labels)), np.zeros(len(labels))
-    for record, e, f in zip(records, residuals, floors, strict=True):
-        spectrum = np.abs(np.fft.rfft(e)) ** 2 / (f * f * e.size**2)
-        frequency = np.fft.rfftfreq(e.size, record.sample_period)
-        index = np.searchsorted(edges, frequency, side="right") - 1
-        held += np.bincount(index, spectrum, len(labels))
-        room += np.bincount(index, minlength=len(labels)) / spectrum.size
-    return _place("frequency", held, room, labels)
-
-
-def _labels(axis: str) -> list[str]:
-    if axis == "amplitude":
-        return [f"{10 * k} to {10 * k + 10} % of the drive range" for k in range(10)]
-    if axis == "direction":
-        return ["falling drive", "drive at rest", "rising drive"]
-    if axis == "turning_point_distance":
-        return [f"{10 * k} to {10 * k + 10} % of the drive range after a turning point" for k in range(10)]
-    edges = EDGES[axis]
-    bins = [_between(f"{a:.2g}", f"{b:.2g}", "s") for a, b in zip(edges, edges[1:], strict=False)]
-    return [f"{bin_} after a change of level" for bin_ in bins]
-
-
-def _between(low: str, high: str, unit: str) -> str:
-    return f"{low} {unit} or more" if high == "inf" else f"{low} to {high} {unit}"
+def _bins(edges: Array, values: NDArray[np.floating[Any]]) -> Bins:
+    return np.searchsorted(edges, values, side="right") - 1
 
 
 def _drive_bins(record: Record, lowest: float, span: float) -> dict[str, Bins]:
@@ -207,14 +177,11 @@ def _drive_bins(record: Record, lowest: float, span: float) -> dict[str, Bins]:
     going = np.where(last_move >= 0, sign[np.maximum(last_move, 0)], 0.0)
     turned = np.diff(going, prepend=going[0]) != 0
     turn = np.maximum.accumulate(np.where(turned, np.arange(u.size), 0))
-    since = np.where(last_move >= 0, np.arange(u.size) - last_move, -1) * record.sample_period
-    idle = np.where(~moving & (last_move >= 0), since, -1.0)
-    times = np.searchsorted(EDGES["time_since_level_change"], np.maximum(idle, 0.0), side="right") - 1
+    rests = ~moving & (last_move >= 0)
+    times = _bins(REST_TIMES, (np.arange(u.size) - last_move) * record.sample_period)
     return {
         "amplitude": np.clip((10 * (u - lowest) / scale).astype(int), 0, 9),
         "direction": (sign + 1).astype(int),
         "turning_point_distance": np.clip((10 * np.abs(u - u[turn]) / scale).astype(int), 0, 9),
-        "time_since_level_change": np.where(
-            idle >= 0, np.minimum(times, EDGES["time_since_level_change"].size - 2), -1
-        ),
+        "time_since_level_change": np.where(rests, np.minimum(times, REST_TIMES.size - 2), -1),
     }

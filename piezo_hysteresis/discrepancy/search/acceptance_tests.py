@@ -28,11 +28,11 @@ from .selection_result import Rejection, typical
 KEEPS = 0.8
 """Largest share of V beyond noise that may remain after an effect."""
 
-AcceptanceTest = Callable[[FittedCandidate, Score, float], Rejection | None]
-"""Takes a fitted candidate, the score of the model before it, and V of a perfect model; None if it passes."""
+AcceptanceTest = Callable[[FittedCandidate, Score], Rejection | None]
+"""Takes a fitted candidate and the score of the model before it; None if it passes."""
 
 
-def gains_little(best: FittedCandidate, before: Score, null: float) -> Rejection | None:
+def gains_little(best: FittedCandidate, before: Score) -> Rejection | None:
     """The gain in cross-validation is too small."""
     gain = before.cost - best.score.cost
     if gain >= LEAST_GAIN:
@@ -40,15 +40,15 @@ def gains_little(best: FittedCandidate, before: Score, null: float) -> Rejection
     return Rejection(best.name, f"in cross-validation it lowers mean ln R² by {gain:.2f}, and {LEAST_GAIN:g} is needed")
 
 
-def leaves_much(best: FittedCandidate, before: Score, null: float) -> Rejection | None:
+def leaves_much(best: FittedCandidate, before: Score) -> Rejection | None:
     """Most of the error beyond noise remains."""
-    left = share_left(best.score, before, null)
+    left = share_left(best.score, before, best.training_data.null)
     if left <= KEEPS:
         return None
     return Rejection(best.name, f"{100 * left:.0f} % of the excess error remains, and {100 * KEEPS:.0f} % is allowed")
 
 
-def owes_its_gain(best: FittedCandidate, before: Score, null: float) -> Rejection | None:
+def owes_its_gain(best: FittedCandidate, before: Score) -> Rejection | None:
     """The gain is due to the refit of everything else, and not to the effect."""
     alone = without(best, LATER)
     owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
@@ -61,9 +61,9 @@ TESTS: tuple[AcceptanceTest, ...] = (gains_little, leaves_much, owes_its_gain)
 """The tests, the cheap ones first; the first rejection counts."""
 
 
-def first_rejection(best: FittedCandidate, before: Score, null: float) -> Rejection | None:
+def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
     """First reason to reject a fitted candidate; None if it passes all tests."""
-    return next((found for test in TESTS if (found := test(best, before, null)) is not None), None)
+    return next((found for test in TESTS if (found := test(best, before)) is not None), None)
 
 
 def share_left(after: Score, before: Score, null: float) -> float:

@@ -71,7 +71,9 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
     loops = [i for i in roles.loops if i in fitted]
     broadband, moving = _telling_dynamics(roles, fitted, at_full_rate)
     if not loops or not broadband:
-        yield identify(_fitted_only(experiment, fitted), held_out=()).model
+        known = Experiment(experiment.records[: max(fitted) + 1])
+        aside = {i for i in range(len(known.records)) if i not in fitted}
+        yield identify(as_conditioning(known, aside), held_out=()).model
         return
     fast = [records[i] for i in at_full_rate]
     try:
@@ -117,10 +119,10 @@ def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int
             yield with_dynamics(model, identify_modes(signals, *form_of(model), ITERATIONS).arx)
 
 
-def _fitted_only(experiment: Experiment, fitted: Collection[int]) -> Experiment:
-    """The records up to the last fitted one; records in between that are not fitted only determine the state."""
-    records = enumerate(experiment.records[: max(fitted) + 1])
-    return Experiment(tuple(r if i in fitted else replace(r, phase=CONDITIONING) for i, r in records))
+def as_conditioning(experiment: Experiment, aside: Collection[int]) -> Experiment:
+    """The experiment in which the records `aside` only determine the state of the stage."""
+    records = tuple(replace(r, phase=CONDITIONING) if i in aside else r for i, r in enumerate(experiment.records))
+    return Experiment(records, experiment.source)
 
 
 def _at_full_rate(experiment: Experiment, fitted: Collection[int]) -> list[int]:

@@ -19,9 +19,9 @@ Records with their floors, split and shortened, and the baseline fitted to them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,7 @@ from .baseline import exact, modal_models, start_models
 from .candidates import score_baseline, score_model
 from .cross_validation import ADEQUATE, Score
 from .execution.cores import start_helpers
-from .refit import FAILURES, LAST, PRECISE, clearly_better, joint
+from .refit import FAILURES, LAST, PRECISE, joint
 from .selection_result import Selection
 from .test_records import choose_test_records
 from .training_data import TrainingData
@@ -49,6 +49,9 @@ Array = NDArray[np.float64]
 
 SEARCHED, FITTED = 6_000, 50_000
 """Largest number of samples of a record, approximately, in the search and in the last fit."""
+CLEARLY = 0.7
+"""Largest ratio of V with a sum of modes to V before: a small improvement may only be another way of absorbing the
+missing effect."""
 UNSURE = 0.3
 """Share of the inter-sample error that is added to the floor; the correction removes the rest."""
 
@@ -91,15 +94,10 @@ class BaselineSetup:
     baseline: Fit
     score: Score
 
-    @property
-    def null(self) -> float:
-        """V of a perfect model."""
-        return float(np.mean([(self.noise[i] / self.least[i]) ** 2 for i in self.fitted]))
-
-    @property
-    def whole(self) -> tuple[Record, ...]:
-        """The training records of the last fit, averaged or cut to about `FITTED` samples where they are longer."""
-        return tuple(records_to_fit(shortened(self.records, FITTED), self.least.tolist(), self.fitted)[0])
+    def for_last_fit(self, training_data: TrainingData) -> TrainingData:
+        """Training data with its records averaged or cut to about `FITTED` samples where they are longer."""
+        kept, _ = records_to_fit(shortened(self.records, FITTED), self.least.tolist(), self.fitted)
+        return replace(training_data, records=tuple(kept))
 
     @property
     def whole_noise(self) -> Array:
@@ -158,7 +156,8 @@ def prepare_baseline(
 
     def gathered(records: Sequence[Record], least: Array) -> TrainingData:
         kept, sizes = records_to_fit(shortened(records, SEARCHED), least.tolist(), fitted)
-        return TrainingData(tuple(kept), np.array(sizes), Nuisance(), extent, start=unfitted)
+        null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
+        return TrainingData(tuple(kept), np.array(sizes), Nuisance(), extent, start=unfitted, null=null)
 
     training_data = gathered(records, least)
     progress("joint fit of the baseline", 0.2)
@@ -176,24 +175,30 @@ def prepare_baseline(
     training_data, score = score_baseline(baseline.model, training_data)
     if score.excess > ADEQUATE:
         start_helpers()  # effects will be searched for
-        baseline, score = best_of_starts(baseline, score, starts, training_data)
+        for other in starts:
+            baseline, score = better_fit(exact(other), baseline, score, training_data)
     if score.excess > ADEQUATE:
         for modal in modal_models(baseline.model, records, fitted):
-            baseline, score = clearly_better(modal, baseline, score, training_data) or (baseline, score)
+            baseline, score = better_fit(modal, baseline, score, training_data, CLEARLY)
     return BaselineSetup(
         straight, records, lost, noise, least, span, usable, fitted, test_records, training_data, baseline, score
     )
 
 
-def best_of_starts(found: Fit, score: Score, starts: Iterator[Model], training_data: TrainingData) -> tuple[Fit, Score]:
-    """The fit and its score, or those from another start if cross-validation and fit are better.
+def better_fit(
+    start: Model, found: Fit, score: Score, training_data: TrainingData, share: float = np.inf
+) -> tuple[Fit, Score]:
+    """A fit and its score, or those from another start if cross-validation and fit are better.
 
-    A start from which the fit fails is left out.
+    The start is judged first, after one linear step. A start that is not better then, or from which the fit fails, is
+    left out. Cross-validation compares C, or V if only a `share` of V may remain.
     """
-    for start in map(exact, starts):
-        with suppress(*FAILURES):
-            if score_model(start, training_data).cost < score.cost:
-                other = joint(start, training_data, LAST, PRECISE)
-                if other.cost < found.cost:
-                    found, score = other, score_model(other.model, training_data)
+    with suppress(*FAILURES):
+        first = score_model(start, training_data)
+        if first.cost < score.cost if np.isinf(share) else first.excess < score.excess:
+            other = joint(start, training_data, LAST, PRECISE)
+            if other.cost < found.cost:
+                after = score_model(other.model, training_data)
+                if after.excess < share * score.excess:
+                    return other, after
     return found, score

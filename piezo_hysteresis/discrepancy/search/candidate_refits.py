@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -45,6 +45,9 @@ FEWEST_STARTS = 3
 TIE = 0.02
 """Difference in gain up to which the form and the effect with the fewest parameters are taken."""
 
+Fitter = Callable[[Candidate], FittedCandidate | None]
+"""Fits a candidate; None if this diverges."""
+
 
 def refit_candidates(
     model: Model, candidates: Sequence[Candidate], before: Score, progress: Progress
@@ -61,27 +64,35 @@ def refit_candidates(
     anew = list[FittedCandidate]()
     for _, result in on_cores(_anew, refits[:AGAIN], lambda c: not (anew and _is_far_behind(c, anew[0], before))):
         anew.append(result)
-    renewed = {c.name for c in anew}
-    field = sorted([*anew, *(c for c in refits if c.name not in renewed)], key=_cost)
+    field = _replaced(refits, anew)
     progress("refits of the best candidates", 0.8)
     found = list[FittedCandidate]()
     for _, result in on_cores(
         partial(settled, before=before), field, lambda c: not found or _is_close(c, found[0], before)
     ):
         found.append(result)
-    converged = {c.name for c in found}
-    return sorted([*found, *(c for c in field if c.name not in converged)], key=_cost)
+    return _replaced(field, found)
+
+
+def _replaced(before: list[FittedCandidate], after: list[FittedCandidate]) -> list[FittedCandidate]:
+    """The refits before, with those of the same effects after, best first."""
+    names = {c.name for c in after}
+    return sorted([*after, *(c for c in before if c.name not in names)], key=_cost)
 
 
 def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
     """Refits of effects of the drive and the loop that the dynamics have absorbed, so that no score test shows them."""
     bending = [c for c in candidates if _bends_dynamics(c)]
-    found = on_cores(partial(_settled_from_all_starts, model, before), bending)
+    return _all_settled(partial(from_all_starts, model, max_iterations=FIRST), bending, before)
+
+
+def _all_settled(fit: Fitter, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
+    found = on_cores(partial(_settled, fit, before), candidates)
     return [c for _, c in found if c is not None]
 
 
-def _settled_from_all_starts(model: Model, before: Score, candidate: Candidate) -> FittedCandidate | None:
-    found = from_all_starts(model, candidate, FIRST)
+def _settled(fit: Fitter, before: Score, candidate: Candidate) -> FittedCandidate | None:
+    found = fit(candidate)
     return None if found is None else settled(found, before)
 
 
@@ -98,13 +109,7 @@ def refits_of_twins(candidates: Sequence[Candidate], best: FittedCandidate, befo
     Each refit begins with the fitted model of the best one, because the loop is the same.
     """
     twins = [c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name]
-    found = on_cores(partial(_settled_refit, best.fit.model.without(best.name), before), twins)
-    return [c for _, c in found if c is not None]
-
-
-def _settled_refit(model: Model, before: Score, candidate: Candidate) -> FittedCandidate | None:
-    found = refit(model, candidate, LATER)
-    return None if found is None else settled(found, before)
+    return _all_settled(partial(refit, best.fit.model.without(best.name), max_iterations=LATER), twins, before)
 
 
 def _anew(candidate: FittedCandidate) -> FittedCandidate:

@@ -177,7 +177,9 @@ def _screen_off(model: Model, training_data: TrainingData, base: list[str], memb
             extended = trial
         except ModelError:
             members = [m for m in members if m is not effect]
-    own = {e.name: [n for n in adjusted_numbers(extended, training_data) if n.startswith(f"{e.name}.")] for e in members}
+    own = {
+        e.name: [n for n in adjusted_numbers(extended, training_data) if n.startswith(f"{e.name}.")] for e in members
+    }
     names = base + [n for e in members for n in own[e.name]]
     products = grams(extended, training_data.records, names, training_data.nuisance)
     columns = directions(model, base, len(names) - len(base))

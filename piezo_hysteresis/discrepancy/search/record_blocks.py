@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...effects.extent import Extent
 from ...identification.fit.normal_equations import Nuisance
@@ -28,6 +29,8 @@ from ...model.model import Model
 from ...record import Record
 from .training_data import TrainingData
 
+Array = NDArray[np.float64]
+
 BLOCKS = 16
 """Approximate number of blocks into which the records are cut."""
 FEWEST = 256
@@ -35,7 +38,7 @@ FEWEST = 256
 
 
 def training_data_of(
-    records: Sequence[Record], fitted: Collection[int], least: Sequence[float], model: Model
+    records: Sequence[Record], fitted: Collection[int], noise: Array, least: Array, model: Model
 ) -> TrainingData:
     """The blocks of the records `fitted`, with their floors and what is free in each record.
 
@@ -45,8 +48,8 @@ def training_data_of(
         In order.
     fitted : collection of int
         Indices of the records to fit; the others only determine the state of the stage.
-    least : sequence of float
-        Floor of every record [m].
+    noise, least : (r,) ndarray
+        Noise and floor of every record [m].
     model : Model
         Model with which the fit begins.
     """
@@ -55,7 +58,8 @@ def training_data_of(
     jumps = tuple(i for i, b in enumerate(blocks) if not b.continues and step_length(records[origin[i] or 0]) == b.size)
     extent = Extent.of([records[i] for i in fitted], model.voltage_scale, model.displacement_scale)
     free = Nuisance(offset=sum(not r.continues for r in records) > 1)
-    return TrainingData(tuple(blocks), weights, free, extent, jumps)
+    null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
+    return TrainingData(tuple(blocks), weights, free, extent, jumps, null=null)
 
 
 def blocks_of(records: Sequence[Record], used: Collection[int]) -> tuple[list[Record], list[int | None]]:

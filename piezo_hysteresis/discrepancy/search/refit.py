@@ -44,9 +44,6 @@ TOLERANCE = 1e-3
 """Relative decrease of the cost at convergence of a refit."""
 LAST, PRECISE = 25, 1e-4
 """Number of linearisations of a last fit, and relative decrease of the cost at convergence."""
-CLEARLY = 0.7
-"""Largest ratio of V from another start to V before: a small improvement may only be another way of absorbing the
-missing effect."""
 MODAL_GAIN = 0.1
 """Gain from which a sum of modes is used as the dynamics."""
 FAILURES = (DivergenceError, IdentificationError, ModelError, ParameterError)
@@ -92,21 +89,6 @@ def joint(model: Model, training_data: TrainingData, max_iterations: int, tolera
         max_iterations=max_iterations,
         tolerance=tolerance,
     )
-
-
-def clearly_better(start: Model, found: Fit, score: Score, training_data: TrainingData) -> tuple[Fit, Score] | None:
-    """The fit from another start and its score, if cross-validation prefers it clearly; otherwise None.
-
-    The start is judged first, after one linear step. A start that is not better then is not fitted.
-    """
-    with suppress(*FAILURES):
-        if score_model(start, training_data).excess >= score.excess:
-            return None
-        other = joint(start, training_data, LAST, PRECISE)
-        other_score = score_model(other.model, training_data)
-        if other.cost < found.cost and other_score.excess < CLEARLY * score.excess:
-            return other, other_score
-    return None
 
 
 def refit(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:

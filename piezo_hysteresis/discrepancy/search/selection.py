@@ -55,7 +55,6 @@ def select(
     model: Model,
     training_data: TrainingData,
     score: Score,
-    null: float,
     effects: Collection[type[Effect]] = CATALOGUE,
     progress: Progress | None = None,
 ) -> Selection:
@@ -69,8 +68,6 @@ def select(
         Records for fitting and choosing.
     score : Score
         Score of the baseline.
-    null : float
-        V of a perfect model.
     effects : collection of Effect classes
         Effects to choose from.
     progress : callable, optional
@@ -80,7 +77,7 @@ def select(
     baseline, steps, accepted, in_time = model, list[Step](), 0, False
     with suppress(TimeSpentError):
         while score.excess > ADEQUATE and accepted < MOST:
-            step = _turn(model, training_data, score, null, effects, report)
+            step = _turn(model, training_data, score, effects, report)
             if step is None:
                 break
             steps.append(step)
@@ -89,14 +86,13 @@ def select(
             model, score, training_data = step.best.fit.model, step.best.score, step.best.training_data
             accepted += 1
         in_time = True
-    return Selection(baseline, model, score, tuple(steps), null, in_time, training_data)
+    return Selection(baseline, model, score, tuple(steps), training_data.null, in_time, training_data)
 
 
 def _turn(
     model: Model,
     training_data: TrainingData,
     before: Score,
-    null: float,
     effects: Collection[type[Effect]],
     progress: Progress,
 ) -> Step | None:
@@ -111,10 +107,10 @@ def _turn(
     if not refits:
         return None
     refits = _best_of_each([*refits, *refits_of_twins(screened, refits[0], before)])
-    best, rejection = _judged(refits, before, null)
+    best, rejection = _judged(refits, before)
     if rejection is not None and (late := refits_behind_new_dynamics(model, screened, before)):
         refits = _best_of_each([*refits, *late])
-        best, rejection = _judged(refits, before, null)
+        best, rejection = _judged(refits, before)
     rejection = rejection or _untried_twin(type(best.effect), effects)
     accepted, rivals = rejection is None, list[FittedCandidate]()
     rejected = [Rejection(name, f"on slow drive it equals {t}, which is in the model") for name, t in twins.items()]
@@ -151,7 +147,7 @@ def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> Re
     return None
 
 
-def _judged(refits: list[FittedCandidate], before: Score, null: float) -> tuple[FittedCandidate, Rejection | None]:
+def _judged(refits: list[FittedCandidate], before: Score) -> tuple[FittedCandidate, Rejection | None]:
     """The best refit, and the rejection of its effect or None."""
     best = finest(simplest(refits), before)
-    return best, first_rejection(best, before, null)
+    return best, first_rejection(best, before)

@@ -57,6 +57,8 @@ class TrainingData:
         Indices of records that are the only ones of their kind or alone determine a parameter; never left out.
     start : Model, optional
         The model before any joint fit; its hysteresis was fitted to slow records only.
+    null : float
+        V of a perfect model: mean squared ratio of noise to floor.
     """
 
     records: tuple[Record, ...]
@@ -65,6 +67,7 @@ class TrainingData:
     extent: Extent
     alone: tuple[int, ...] = ()
     start: Model | None = None
+    null: float = 1.0
 
     @property
     def begins_at_levels(self) -> bool:

@@ -31,7 +31,7 @@ from ...identification.fit.bounded_step import bounded_step, room_of
 from ...identification.fit.normal_equations import grams
 from ...identification.records.excitation_content import excitation_content
 from ...model.model import Model
-from ..search.candidates import directions, adjusted_numbers
+from ..search.candidates import adjusted_numbers, directions
 from ..search.training_data import TrainingData
 
 Array = NDArray[np.float64]

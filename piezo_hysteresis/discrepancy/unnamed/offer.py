@@ -47,7 +47,7 @@ FEW = 10
 """Number of linearisations of a trial; few, because a correction is small and linear in its parameters."""
 
 
-def best_correction(model: Model, setup: BaselineSetup, null: float) -> Correction | None:
+def best_correction(model: Model, setup: BaselineSetup) -> Correction | None:
     """The best correction of a fitted model, with the results of its tests.
 
     Parameters
@@ -56,8 +56,6 @@ def best_correction(model: Model, setup: BaselineSetup, null: float) -> Correcti
         Fitted model, whose residual no effect explains.
     setup : BaselineSetup
         Records and floors.
-    null : float
-        V of a perfect model on the training records.
 
     Returns
     -------
@@ -75,7 +73,7 @@ def best_correction(model: Model, setup: BaselineSetup, null: float) -> Correcti
     if not found:
         return None
     best = max(found, key=lambda c: min(c.gain_rate, c.gain_amplitude))
-    return best if best.refusal else judged_on_test_records(best, model, setup, null)
+    return best if best.refusal else judged_on_test_records(best, model, setup)
 
 
 def forms(model: Model, training_data: TrainingData) -> Iterator[UnnamedCorrection]:
@@ -126,9 +124,9 @@ def fitted_correction(
     return Correction(effect, model.displacement_scale, None, by_rate, by_amplitude, None, 0.0, refusal)
 
 
-def judged_on_test_records(correction: Correction, model: Model, setup: BaselineSetup, null: float) -> Correction:
+def judged_on_test_records(correction: Correction, model: Model, setup: BaselineSetup) -> Correction:
     """The correction after the last fit to all samples, judged on the test records."""
-    training_data = replace(setup.training_data, records=setup.whole)
+    training_data = setup.for_last_fit(setup.training_data)
     try:
         fit = joint(model.with_effect(correction.effect), training_data, LAST, PRECISE)
         both, nuisances = (model, fit.model), (training_data.nuisance, training_data.nuisance)
@@ -137,7 +135,7 @@ def judged_on_test_records(correction: Correction, model: Model, setup: Baseline
         return replace(correction, refusal=f"its last fit failed ({error})")
     ratios = np.array([(p.before / p.floor, p.after / p.floor) for p in gap.per_phase])
     first, second = np.mean(ratios**2, axis=0).tolist()
-    removed, (effect,) = explained(first, second, null), corrections_in(fit.model)
+    removed, (effect,) = explained(first, second, training_data.null), corrections_in(fit.model)
     found = replace(correction, effect=effect, gap=gap, removed=removed)
     if removed < REMOVES:
         least = f"at least {100 * REMOVES:g} % is needed"

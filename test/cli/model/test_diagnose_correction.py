@@ -42,10 +42,9 @@ ACCEPTED = Correction(HUMP, 1e-5, PLAIN.with_effect(HUMP), 1.2, 0.9, GAP, 0.85, 
 def answered(correction: Correction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[int, Path]:
     """The exit code of the command for a diagnosis with this correction, and the file that was asked for."""
     record = Record(np.sin(np.arange(9.0)), 1e-6 * np.arange(9.0), 1e-3, phase="sine_1hz")
-    found = Diagnosis(
-        Conclusion.UNEXPLAINED_GAP, "Something is missing.", PLAIN, PLAIN, None, None, (), None, None,
-        Experiment((record,)), correction=correction,
-    )  # fmt: skip
+    experiment = Experiment((record,))
+    reason = "Something is missing."
+    found = Diagnosis(Conclusion.UNEXPLAINED_GAP, reason, PLAIN, PLAIN, experiment, correction=correction)
     monkeypatch.setattr(command, "diagnose", lambda *_, **__: found)
     monkeypatch.setattr(command.reading_options, "read", lambda _: found.experiment)
     monkeypatch.setenv("COLUMNS", "300")

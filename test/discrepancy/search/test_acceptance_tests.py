@@ -35,10 +35,10 @@ from piezo_hysteresis.model.model import Model
 EXTENT = Extent(0.0, 10.0, 1e3, 10.0, 1e-5, 2e-5, 100.0, 10.0, 10.0)
 
 
-def fitted(effect, names, covariance):
+def fitted(effect, names, covariance, null=1.0):
     model = Model((BoucWen(A=0.5, beta=3.0, gamma=0.5, p1=0.0, p2=1.0), effect), 2e-5, 10.0, 1e-5)
     result = Fit(model, names, np.asarray(covariance), 1.0, (), (), (), True, 3)
-    training_data = TrainingData((), np.array([]), Nuisance(), EXTENT)
+    training_data = TrainingData((), np.array([]), Nuisance(), EXTENT, null=null)
     return FittedCandidate(effect, training_data, Score(np.ones(3), np.zeros(len(names))), result)
 
 
@@ -58,17 +58,17 @@ def scored(*ratios):
     ids=["little gain", "enough gain", "gain of the refit alone", "gain of the effect", "nothing to compare with"],
 )
 def test_an_effect_must_gain_also_over_the_model_that_was_refitted_without_it(monkeypatch, before, alone, reason):
-    drift = fitted(GainDrift(g=0.05, tau=600.0), ("gain_drift.g", "gain_drift.tau"), np.eye(2))
+    drift = fitted(GainDrift(g=0.05, tau=600.0), ("gain_drift.g", "gain_drift.tau"), np.eye(2), null=0.5)
     refitted = alone and Fitted(drift.fit.model, scored(*alone))
     monkeypatch.setattr(acceptance_tests, "without", lambda candidate, iterations: refitted)
-    rejection = first_rejection(replace(drift, score=scored(1.0, 1.0)), scored(*before), 0.5)
+    rejection = first_rejection(replace(drift, score=scored(1.0, 1.0)), scored(*before))
     assert rejection is None if reason is None else (rejection.name == "gain_drift" and reason in rejection.reason)
 
 
 def test_an_effect_that_leaves_most_of_the_error_is_rejected():
     """C cannot see it: the logarithm counts a change of one record as much as that of a record with all of the gap."""
     drift = fitted(GainDrift(g=0.05, tau=600.0), ("gain_drift.g", "gain_drift.tau"), np.eye(2))
-    rejection = first_rejection(replace(drift, score=scored(1.0, 29.0)), scored(3.0, 30.0), 1.0)
+    rejection = first_rejection(replace(drift, score=scored(1.0, 29.0)), scored(3.0, 30.0))
     assert "of the excess error remains" in rejection.reason
 
 

@@ -59,8 +59,9 @@ def test_a_start_from_which_the_fit_fails_hides_no_later_one(monkeypatch):
         return fitted(start, 1.0)
 
     monkeypatch.setattr(baseline_setup, "joint", joint)
-    monkeypatch.setattr(baseline_setup, "exact", lambda model: model)
     monkeypatch.setattr(baseline_setup, "score_model", lambda model, _: Score(np.ones(4), np.zeros(1)))
     poor = Score(np.full(4, 5.0), np.zeros(1))
-    found, _ = baseline_setup.best_of_starts(fitted(first, 25.0), poor, iter((second, third)), training_data)
-    assert found.model is third
+    found = fitted(first, 25.0), poor
+    for start in (second, third):
+        found = baseline_setup.better_fit(start, *found, training_data)
+    assert found[0].model is third

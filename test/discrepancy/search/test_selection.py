@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 from piezo_hysteresis.discrepancy.search.cross_validation import ADEQUATE, Score
 from piezo_hysteresis.discrepancy.search.selection import select
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, explained
+from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 
 
 @given(null=st.floats(0.1, 1.5), gap=st.floats(1.0, 1e4), share=st.floats(0.0, 1.0))
@@ -39,6 +40,6 @@ def test_explained_stays_between_nothing_and_all():
 
 def test_nothing_is_tried_on_a_model_that_is_adequate():
     score = Score(np.sqrt(np.full(5, ADEQUATE)), np.empty(0))
-    found = select(None, None, score, 1.0)
+    found = select(None, TrainingData((), np.empty(0), None, None), score)
     assert isinstance(found, Selection)
     assert found.steps == found.accepted == ()
