@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`DiagnosisState`: intermediate results between two passes of a diagnosis."""
+"""`DiagnosisState`: the experiment and the options of a diagnosis, between two of its passes."""
 
 from __future__ import annotations
 
@@ -22,15 +22,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import Effect
-from ..errors import IdentificationError
 from ..identification.fit.fit import Progress
 from ..identification.fit.form_uncertainty import PIECES
 from ..model.model import Model
 from ..record import CONDITIONING, Experiment
 from .excitation_check import moves
-from .residual.localise import ResidualShare
-from .search.baseline_setup import BaselineSetup
-from .search.selection_result import Selection
 
 VOLTAGE_NOISE = "voltage_noise"
 """Kind of the notice about an experiment from whose voltage the noise was removed."""
@@ -40,7 +36,7 @@ IDLE = ("idle", "hold", CONDITIONING)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DiagnosisState:
-    """Intermediate results between two passes of a diagnosis.
+    """The experiment and the options of a diagnosis, between two of its passes.
 
     Parameters
     ----------
@@ -56,12 +52,6 @@ class DiagnosisState:
         Time at which the search for effects has to end, on the clock of `time.monotonic` [s].
     explicit_step : bool
         Whether the error of an explicit step of the loop may be subtracted.
-    setup : BaselineSetup or None
-        Floors, records, and the baseline that was fitted to them.
-    where : tuple of ResidualShare
-        Distribution of the residual of the baseline.
-    selection : Selection or None
-        Result of the search.
     given : Experiment or None
         The experiment as it was recorded, before the passes prepared it.
     """
@@ -72,9 +62,6 @@ class DiagnosisState:
     progress: Progress
     end: float = np.inf
     explicit_step: bool = False
-    setup: BaselineSetup | None = None
-    where: tuple[ResidualShare, ...] = ()
-    selection: Selection | None = None
     given: Experiment | None = None
 
     @property
@@ -93,17 +80,3 @@ class DiagnosisState:
     def corrects_intersample_error(self) -> bool:
         """Whether the inter-sample error is corrected; not with a noisy voltage, whose averages reverse at random."""
         return all(n.kind != VOLTAGE_NOISE for n in self.experiment.notices)
-
-    @property
-    def fitted(self) -> BaselineSetup:
-        """The baseline setup, from an earlier pass."""
-        if self.setup is None:
-            raise IdentificationError("diagnose: got no baseline, expected the pass fit_baseline before this one")
-        return self.setup
-
-    @property
-    def searched(self) -> Selection:
-        """The result of the search, from an earlier pass."""
-        if self.selection is None:
-            raise IdentificationError("diagnose: got no search, expected the pass search_effects before this one")
-        return self.selection

@@ -19,35 +19,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..errors import DivergenceError, IdentificationError
-from ..identification.fit.fit import Progress
+from ..errors import IdentificationError
 from ..identification.records.conditioning_split import known_from_within
 from ..identification.records.roles import roles_of
-from ..model.model import Model
 from ..record import Notice
 from .changes.same_stage import same_stage
-from .conclusion import concluded
 from .diagnosis import Conclusion, Diagnosis
 from .diagnosis_state import VOLTAGE_NOISE, DiagnosisState
 from .excitation_check import check_motion, moves
-from .explicit_step import KIND, explicit_model, without_steps
 from .single_record import diagnose_few
-from .residual.localise import ResidualShare, located
+from .many_records import diagnose_many
 from .residual.sampling import NOISE_WIDTH, is_faster, quieted, resampled, voltage_noise
-from .search.baseline_setup import BaselineSetup, prepare_baseline
-from .search.cross_validation import ADEQUATE
-from .search.execution.time_limit import ending_at
-from .search.selection import select
 from .unnamed.correction import without_corrections
 from .verdict import FEWEST_RECORDS
-
-Array = NDArray[np.float64]
-
-STEPS_LEAVE = 10.0
-"""Largest cost after the subtraction of an explicit step, if it is subtracted before the search."""
 
 RESAMPLED = "resampled"
 """Kind of the notice about records that are faster than the given model."""
@@ -128,87 +112,11 @@ def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosi
     return found or replace(state, model=without_corrections(model))
 
 
-def answer_few_records(state: DiagnosisState) -> DiagnosisState | Diagnosis:
-    """Ends if there are few records or none is broadband: the answer follows from the chosen structure."""
+def answer(state: DiagnosisState) -> Diagnosis:
+    """The answer, for few records from the chosen structure: with fewer than four, or if none is broadband."""
     needs_structure = state.model is None and not roles_of(state.experiment).broadband
-    if len(state.moving) >= FEWEST_RECORDS and not needs_structure:
-        return state
-    return diagnose_few(state.experiment, state.model, state.moving, state.effects, state.progress, state.end)
-
-
-def fit_baseline(state: DiagnosisState) -> DiagnosisState:
-    """Estimates the floors, chooses the test records, and fits the published model to the others."""
-    setup = prepare_baseline(
-        state.experiment.records,
-        state.usable,
-        state.model,
-        state.selection,
-        state.corrects_intersample_error,
-        state.progress,
-    )
-    return replace(state, setup=setup, where=_where(setup, state.progress), selection=None)
-
-
-def search_effects(state: DiagnosisState) -> DiagnosisState:
-    """Adds effects to the baseline while cross-validation improves."""
-    setup = state.fitted
-    with ending_at(state.end):
-        selection = select(
-            setup.baseline.model,
-            setup.training_data,
-            setup.score,
-            state.effects,
-            lambda word, part: state.progress(word, 0.4 + 0.4 * part),
-        )
-    return replace(state, selection=selection)
-
-
-def search_again_with_sharper_samples(state: DiagnosisState) -> DiagnosisState:
-    """Searches once more, if time is left and the model that was found corrects averaged samples differently."""
-    selection = state.searched
-    extends = selection.in_time and bool(selection.accepted)
-    if not (extends and state.corrects_intersample_error and state.fitted.changes_intersample_error(selection.model)):
-        return state
-    again = search_effects(fit_baseline(state))
-    return again if again.searched.in_time else state
-
-
-def treat_explicit_steps(state: DiagnosisState) -> DiagnosisState | Diagnosis:
-    """Data of a simulation with an explicit step of the loop: subtract its error if the user asked for it, or end.
-
-    Before the search only if nothing else is missing; after it with the first effects with which the data show it.
-    """
-    setup, selection = state.fitted, state.selection
-    training_data, model = setup.training_data, setup.baseline.model
-    if any(n.kind == KIND for n in state.experiment.notices) or setup.score.excess <= ADEQUATE:
-        return state
-    if selection is None:
-        explicit = explicit_model(model, training_data, STEPS_LEAVE)
-        return state if explicit is None else _freed(state, explicit)
-    for step in (s.best for s in selection.accepted if selection.in_time):
-        leaves_a_gap = step.score.excess > ADEQUATE
-        explicit = explicit_model(step.fit.model, step.training_data) if leaves_a_gap else None
-        if explicit is not None:
-            freed = _freed(state, explicit)
-            return freed if isinstance(freed, Diagnosis) else search_effects(freed)
-    return state
-
-
-def _freed(state: DiagnosisState, explicit: Model) -> DiagnosisState | Diagnosis:
-    if state.explicit_step:
-        freed = without_steps(state.experiment, explicit)
-        return fit_baseline(replace(state, experiment=freed, selection=None))
-    reason = (
-        "No verdict is possible: the data were simulated with the explicit step of Eq. (7), which no real stage takes. "
-        "Diagnose them with --explicit-step (Python: explicit_step=True)."
-    )
-    model = state.fitted.baseline.model
-    return Diagnosis(Conclusion.INSUFFICIENT_DATA, reason, model, model, state.experiment, where=state.where)
-
-
-def conclude(state: DiagnosisState) -> Diagnosis:
-    """Ends with the last fits, the gap on the test records, and the verdict."""
-    return concluded(state.experiment, state.fitted, state.where, state.searched, state.progress, state.model)
+    is_many = len(state.moving) >= FEWEST_RECORDS and not needs_structure
+    return diagnose_many(state) if is_many else diagnose_few(state)
 
 
 PASSES: tuple[Pass, ...] = (
@@ -217,21 +125,6 @@ PASSES: tuple[Pass, ...] = (
     check_data,
     resample_for_the_given_model,
     compare_with_given_model,
-    answer_few_records,
-    fit_baseline,
-    treat_explicit_steps,
-    search_effects,
-    treat_explicit_steps,
-    search_again_with_sharper_samples,
-    conclude,
+    answer,
 )
 """The diagnosis, in the order in which the passes run."""
-
-
-def _where(setup: BaselineSetup, progress: Progress) -> tuple[ResidualShare, ...]:
-    progress("location of the residual", 0.35)
-    model, least, nuisance = setup.baseline.model, setup.least.tolist(), setup.training_data.nuisance
-    try:
-        return located(model, setup.records, setup.usable, least, nuisance)
-    except DivergenceError:  # on a test record, which moves further than those that were fitted
-        return located(model, setup.records, setup.fitted, least, nuisance)

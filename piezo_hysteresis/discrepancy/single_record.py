@@ -25,19 +25,17 @@ from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from ..effects import Effect
 from ..errors import PiezoError
-from ..identification.fit.fit import Fit, Progress
+from ..identification.fit.fit import Fit
 from ..identification.fit.normal_equations import Nuisance
 from ..identification.identify import identify
 from ..identification.records.conditioning import with_conditioning
 from ..identification.structure.left_out import has_several_drives, score_left_out
 from ..model.model import Model
 from ..model.provenance import provenance
-from ..record import Experiment, Notice, Record
+from ..record import Notice, Record
 from .diagnosis import Conclusion, Diagnosis
+from .diagnosis_state import DiagnosisState
 from .excitation_check import missing_excitation
 from .gap import Gap, measure_gap, with_stated_error
 from .next_experiment import best_next_experiment
@@ -74,31 +72,15 @@ class _Delivered:
     nuisance: Nuisance
 
 
-def diagnose_few(
-    experiment: Experiment,
-    model: Model | None,
-    used: Collection[int],
-    effects: Collection[type[Effect]],
-    progress: Progress,
-    end: float = np.inf,
-) -> Diagnosis:
+def diagnose_few(state: DiagnosisState) -> Diagnosis:
     """Extend the best model while cross-validation improves, and name the effects that are certain.
 
     Parameters
     ----------
-    experiment : Experiment
-        Records in order.
-    model : Model or None
-        Model with which the search begins; None to identify one from the experiment.
-    used : collection of int
-        Indices of the records in which the drive moves.
-    effects : collection of Effect classes
-        Effects to choose from.
-    progress : callable
-        Called with a message and the fraction done.
-    end : float
-        Time at which the search for further effects has to end, on the clock of `time.monotonic` [s].
+    state : DiagnosisState
+        The prepared records; without a given model, one is identified from them.
     """
+    experiment, model, used, progress = state.experiment, state.model, state.moving, state.progress
     records = experiment.records
     aside = choose_test_records(records, used) if len(used) >= FEWEST_RECORDS else ()
     fitted = [i for i in used if i not in aside]
@@ -126,8 +108,8 @@ def diagnose_few(
     if found and found.structure and before.excess > ADEQUATE and several:
         steps = structure_steps(found, before, training_data, short, least.tolist(), fitted)
     is_certain = bool(steps)
-    fitting = [e for e in effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
-    with ending_at(end):
+    fitting = [e for e in state.effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
+    with ending_at(state.end):
         more = select(now.model, training_data, score, fitting, lambda word, part: progress(word, 0.6 + 0.3 * part))
     chosen = sorted(aside or fitted)
     free = Nuisance(offset=True)

@@ -22,6 +22,7 @@ therefore projected orthogonally to all free parameters of the model. The inner 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -113,22 +114,25 @@ def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
 
 def score_model(model: Model, training_data: TrainingData) -> Score:
     """Score of a fitted model on records left out."""
-    products, floors, columns, limits = _products(model, training_data)
-    return cross_validate(products, floors, columns, training_data.alone, limits)
+    return _score(training_data, *_linearised(model, training_data))
 
 
 def score_baseline(model: Model, training_data: TrainingData) -> tuple[TrainingData, Score]:
     """The training data and the score. A record that alone determines a parameter of the model is never left out."""
-    products, floors, columns, limits = _products(model, training_data)
-    alone = indispensable(products, floors, columns)
-    return replace(training_data, alone=alone), cross_validate(products, floors, columns, alone, limits)
+    products, columns, room = _linearised(model, training_data)
+    training_data = replace(training_data, alone=indispensable(products, training_data.floors, columns))
+    return training_data, _score(training_data, products, columns, room)
 
 
-def _products(model: Model, training_data: TrainingData) -> tuple[list[Gram], Array, Array, tuple[Array, Array]]:
+def _linearised(model: Model, training_data: TrainingData) -> tuple[list[Gram], Array, tuple[Array, Array]]:
     names = adjusted_numbers(model, training_data)
     products = grams(model, training_data.records, names, training_data.nuisance)
     columns = directions(model, names)
-    return products, training_data.floors, columns, room_of(model, names, columns)
+    return products, columns, room_of(model, names, columns)
+
+
+def _score(training_data: TrainingData, products: list[Gram], columns: Array, room: tuple[Array, Array]) -> Score:
+    return cross_validate(products, training_data.floors, columns, training_data.alone, room)
 
 
 def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Effect]]) -> list[Candidate]:
@@ -177,45 +181,49 @@ def _screen_off(model: Model, training_data: TrainingData, base: list[str], memb
             extended = trial
         except ModelError:
             members = [m for m in members if m is not effect]
-    own = {
-        e.name: [n for n in adjusted_numbers(extended, training_data) if n.startswith(f"{e.name}.")] for e in members
-    }
-    names = base + [n for e in members for n in own[e.name]]
+    adjusted = adjusted_numbers(extended, training_data)
+    own = [[n for n in adjusted if n.startswith(f"{e.name}.")] for e in members]
+    names = [*base, *(n for added in own for n in added)]
     products = grams(extended, training_data.records, names, training_data.nuisance)
     columns = directions(model, base, len(names) - len(base))
-    kept = columns.shape[1] - (len(names) - len(base))
-    found = []
-    for effect in members:
-        wanted = [kept + names.index(n) - len(base) for n in own[effect.name]]
-        part = columns[:, [*range(kept), *wanted]]
-        limits = room_of(extended, names, part)
-        score = cross_validate(products, training_data.floors, part, training_data.alone, limits)
-        found.append(Candidate(effect, training_data, score))
-    return found
+    return _scored(extended, names, training_data, products, columns, zip(members, map(len, own), strict=True))
 
 
 def _screen_moves(model: Model, training_data: TrainingData, base: list[str], moves: list[Effect]) -> list[Candidate]:
     now = model.free_run(training_data.records)
     usable, rows = [], []
     for effect in moves:
-        try:
+        with suppress(DivergenceError, ParameterError, ModelError):
             then = model.with_effect(effect).free_run(training_data.records)
-        except (DivergenceError, ParameterError, ModelError):
-            continue
-        usable.append(effect)
-        rows.append([a - b for a, b in zip(then, now, strict=True)])
+            rows.append([a - b for a, b in zip(then, now, strict=True)])
+            usable.append(effect)
     if not usable:
         return []
-    extra = [np.array([row[i] for row in rows]) for i in range(len(training_data.records))]
-    products = grams(model, training_data.records, base, training_data.nuisance, extra)
+    changes = [np.array(change) for change in zip(*rows, strict=True)]
+    products = grams(model, training_data.records, base, training_data.nuisance, changes)
     columns = directions(model, base, len(usable))
-    kept = columns.shape[1] - len(usable)
+    found = _scored(model, base, training_data, products, columns, ((e, 1) for e in usable))
+    # with a negative step, the effect with opposite sign would improve the prediction
+    return [c for c in found if c.score.step[-1] > 0.0]
+
+
+def _scored(
+    model: Model,
+    names: Sequence[str],
+    training_data: TrainingData,
+    products: list[Gram],
+    columns: Array,
+    added: Iterable[tuple[Effect, int]],
+) -> list[Candidate]:
+    """Effects with their scores; each has the given number of the last columns, in order."""
+    sizes = list(added)
+    kept = first = columns.shape[1] - sum(size for _, size in sizes)
     found = []
-    for k, effect in enumerate(usable):
-        part = columns[:, [*range(kept), kept + k]]
-        score = cross_validate(products, training_data.floors, part, training_data.alone, room_of(model, base, part))
-        if score.step[-1] > 0.0:  # otherwise the effect with opposite sign would improve the prediction
-            found.append(Candidate(effect, training_data, score))
+    for effect, size in sizes:
+        part = columns[:, [*range(kept), *range(first, first + size)]]
+        first += size
+        score = _score(training_data, products, part, room_of(model, names, part))
+        found.append(Candidate(effect, training_data, score))
     return found
 
 

@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from contextlib import suppress
+from functools import reduce
 
 import numpy as np
 
@@ -96,49 +98,32 @@ def structure_steps(
     fitted : collection of int
         Indices of the fitted records.
     """
+
+    def refitted(model: Model) -> Fit:
+        pieces = pieces_of(records, fitted)
+        by_pieces = fit_pieces(model, pieces, floors, free_numbers(model), FEW)
+        return as_fit(by_pieces, pieces, floors, np.zeros((len(by_pieces.names),) * 2))
+
+    def candidate(name: str, fit: Fit) -> FittedCandidate:
+        return FittedCandidate(fit.model[name], training_data, score_model(fit.model, training_data), fit)
+
+    def rivals(name: str) -> tuple[FittedCandidate, ...]:
+        """A drift instead of creep, if cross-validation is about as good."""
+        if name not in SLOW or ThermalDrift.name in found.model:
+            return ()
+        start = ThermalDrift.starts(training_data.extent)[0]
+        drift = refitted(found.model.without(name).with_effect(start))
+        scores = [score_left_out(model, records, floors, fitted) for model in (drift.model, found.model)]
+        return () if scores[0] - scores[1] >= LEADS else (candidate(ThermalDrift.name, drift),)
+
     names = decided(found)
     steps: list[Step] = []
-    later = list(names)
-    for name in names:
-        later.remove(name)
-        model = found.model
-        for other in later:
-            model = model.without(other)
+    for k, name in enumerate(names, 1):
+        model = reduce(Model.without, names[k:], found.model)
         if MEMORY.name not in model:
             model = model.without(MEMORY.level_term.name)
-        try:
-            fit = found.fit if not later else _refitted(model, records, floors, fitted)
-            score = score_model(fit.model, training_data)
-            rivals = _rivals(found, name, training_data, records, floors, fitted)
-        except PiezoError:
-            continue
-        best = FittedCandidate(fit.model[name], training_data, score, fit)
-        steps.append(Step(before, best, True, rivals, ()))
-        before = score
+        with suppress(PiezoError):
+            best = candidate(name, refitted(model) if names[k:] else found.fit)
+            steps.append(Step(before, best, True, rivals(name), ()))
+            before = best.score
     return steps
-
-
-def _refitted(model: Model, records: Sequence[Record], floors: Sequence[float], fitted: Collection[int]) -> Fit:
-    pieces = pieces_of(records, fitted)
-    found = fit_pieces(model, pieces, floors, free_numbers(model), FEW)
-    return as_fit(found, pieces, floors, np.zeros((len(found.names),) * 2))
-
-
-def _rivals(
-    found: Identification,
-    name: str,
-    training_data: TrainingData,
-    records: Sequence[Record],
-    floors: Sequence[float],
-    fitted: Collection[int],
-) -> tuple[FittedCandidate, ...]:
-    """A drift instead of creep, if cross-validation is about as good."""
-    if name not in SLOW or ThermalDrift.name in found.model:
-        return ()
-    start = ThermalDrift.starts(training_data.extent)[0]
-    drift = _refitted(found.model.without(name).with_effect(start), records, floors, fitted)
-    behind = score_left_out(drift.model, records, floors, fitted) - score_left_out(found.model, records, floors, fitted)
-    if behind >= LEADS:
-        return ()
-    score = score_model(drift.model, training_data)
-    return (FittedCandidate(drift.model[ThermalDrift.name], training_data, score, drift),)
