@@ -20,12 +20,11 @@ effect over a refit without it that had the same number of iterations.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial, reduce
 
-from ...effects import Arx
 from ...errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ...identification.fit.fit import Fit, fit
 from ...identification.steps.dynamics import Dynamics, identify_arx
@@ -122,8 +121,7 @@ def restart(candidate: FittedCandidate, max_iterations: int) -> FittedCandidate:
     if (first := candidate.training_data.start) is not None:
         models.append(reduce(Model.with_effect, [e for e in models[0].effects if e.name not in first], first))
     found = on_cores(partial(_behind_anew, training_data=candidate.training_data), models)
-    start = min((f for _, f in found if f is not None), key=lambda f: f.score.cost, default=None)
-    anew = None if start is None else _refitted(start.model, candidate, max_iterations)
+    anew = _from_best((f for _, f in found), candidate, max_iterations)
     return candidate if anew is None or anew.fit.cost >= candidate.fit.cost else anew
 
 
@@ -134,9 +132,17 @@ def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> 
     estimated dynamics so much that the cost has several minima.
     """
     starts = type(candidate.effect).starts(candidate.training_data.extent)
-    found = [_behind_anew(model.with_effect(start), candidate.training_data, (FEW_ITERATIONS,)) for start in starts]
-    best = min((f for f in found if f is not None), key=lambda f: f.score.cost, default=None)
+    found = (_behind_anew(model.with_effect(start), candidate.training_data, (FEW_ITERATIONS,)) for start in starts)
+    return _from_best(found, candidate, max_iterations)
+
+
+def _from_best(starts: Iterable[Fitted | None], candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
+    best = min(filter(None, starts), key=_cost, default=None)
     return None if best is None else _refitted(best.model, candidate, max_iterations)
+
+
+def _cost(fitted: Fitted) -> float:
+    return fitted.score.cost
 
 
 def _behind_anew(
@@ -148,7 +154,7 @@ def _behind_anew(
     """
     check_time()
     broadband = training_data.broadband()
-    if not broadband or not isinstance(model[Arx.name], Arx):
+    if not broadband:
         return None
     found, best = list[Fitted](), None
 
@@ -161,7 +167,7 @@ def _behind_anew(
         for iterations in choices:
             with suppress(*FAILURES):
                 found.append(behind(identify_arx(signals, *form_of(model), iterations)))
-        best = min(found, key=lambda f: f.score.cost, default=None)
+        best = min(found, key=_cost, default=None)
         if ITERATIONS in choices:
             modes = behind(identify_modes(signals, *form_of(model), ITERATIONS))
             if best is None or modes.score.cost < best.score.cost - MODAL_GAIN:
@@ -177,24 +183,22 @@ def without(candidate: FittedCandidate, max_iterations: int) -> Fitted | None:
     """
     model = candidate.fit.model.without(candidate.name)
     training_data = candidate.training_data.without(candidate.name)
-    starts = [model]
-    if (
-        candidate.effect.family in LINEAR
-        and (found := _absorbed(model, candidate.fit.model, training_data)) is not None
-    ):
-        starts.append(found)
+    starts = [
+        model,
+        _absorbed(model, candidate.fit.model, training_data) if candidate.effect.family in LINEAR else None,
+    ]
     fits = list[Fitted]()
-    for start in starts:
+    for start in filter(None, starts):
         with suppress(*FAILURES):
             fitted = joint(start, training_data, max_iterations).model
             fits.append(Fitted(fitted, score_model(fitted, training_data)))
-    return min(fits, key=lambda f: f.score.cost, default=None)
+    return min(fits, key=_cost, default=None)
 
 
 def _absorbed(model: Model, extended: Model, training_data: TrainingData) -> Model | None:
     """The model with dynamics that imitate `extended`, which has one more linear effect; None if there are none."""
     broadband = training_data.broadband()
-    if not broadband or not isinstance(model[Arx.name], Arx):
+    if not broadband:
         return None
     inputs = hysteresis_signals(model, training_data.records, broadband)
     outputs = extended.free_run(training_data.records)
