@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from ..effects import BoucWen
 from ..effects.hysteresis.explicit_bouc_wen import ExplicitBoucWen
 from ..identification.fit.normal_equations import grams
+from ..identification.records.conditioning import with_conditioning
 from ..model.model import Model
 from ..record import Experiment, Notice, Record
 from .residual.sampling import at_period, is_faster, less
@@ -76,9 +77,11 @@ def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
     """
     loop = ExplicitBoucWen(**model[BoucWen.name].values)
     explicit = replace(model, effects=tuple(loop if e.name == BoucWen.name else e for e in model.effects))
-    pairs = zip(records, model.free_run(records), explicit.free_run(records), strict=True)
-    own = 1.001 * model.sample_period
-    return [b - a if r.sample_period < own else np.zeros(r.size) for r, a, b in pairs]
+    wanted = [i for i, r in enumerate(records) if r.sample_period < 1.001 * model.sample_period]
+    kept = with_conditioning(records, wanted)
+    part = [records[i] for i in kept]
+    found = dict(zip(kept, zip(model.free_run(part), explicit.free_run(part), strict=True), strict=True))
+    return [found[i][1] - found[i][0] if i in wanted else np.zeros(r.size) for i, r in enumerate(records)]
 
 
 def explicit_model(model: Model, training_data: TrainingData, leaves: float = np.inf) -> Model | None:
