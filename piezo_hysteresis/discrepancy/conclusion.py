@@ -75,12 +75,12 @@ def concluded(
     records, least, training_data = setup.records, setup.least, setup.training_data
     progress("gap", 0.85)
     named = is_explained(selection)
-    whole = setup.for_last_fit(training_data)
+    whole, noise = setup.for_last_fit()
     first = joint(selection.baseline, whole, LAST, PRECISE)
-    final, final_training_data = first, training_data
+    final, free = first, training_data.nuisance
     if named:
-        final_training_data = selection.accepted[-1].best.training_data
-        final = _finished(selection, replace(final_training_data, records=whole.records))
+        free = selection.accepted[-1].best.training_data.nuisance
+        final = _finished(selection, replace(whole, nuisance=free))
     unseen = tuple(setup.test_records)
 
     def gap_of(last: Fit, nuisance: Nuisance) -> Gap:
@@ -91,20 +91,18 @@ def concluded(
     falls = diverges = False
     if named:
         with suppress(DivergenceError):  # on a test record, which moves further than those that were fitted
-            gap = gap_of(final, final_training_data.nuisance)
+            gap = gap_of(final, free)
             falls = gap.falls
     if not falls:
-        final, final_training_data = first, training_data
+        final, free = first, training_data.nuisance
         try:
-            gap = gap_of(first, training_data.nuisance)
+            gap = gap_of(first, free)
         except DivergenceError:
             if not unseen:
                 raise
             diverges, unseen = True, ()
-            gap = gap_of(first, training_data.nuisance)
-    final = with_form_uncertainty(
-        final, whole.records, final_training_data.nuisance, final_training_data.floors, setup.whole_noise, setup.span
-    )
+            gap = gap_of(first, free)
+    final = with_form_uncertainty(final, whole.records, free, whole.floors, noise, setup.span)
     progress("next experiment", 0.95)
     if diverges:
         conclusion, reason = Conclusion.INSUFFICIENT_DATA, DIVERGES
@@ -112,9 +110,9 @@ def concluded(
         conclusion, reason = conclusion_of(selection, falls, falls or not named, gap)
     if given is not None:
         chosen = tuple(p.index for p in gap.per_phase)
-        free = replace(training_data.nuisance, offset=True), replace(final_training_data.nuisance, offset=True)
+        zeros = replace(training_data.nuisance, offset=True), replace(free, offset=True)
         with suppress(DivergenceError):
-            gap = measure_gap((given, final.model), records, chosen, least.tolist(), setup.span, free, gap.unseen)
+            gap = measure_gap((given, final.model), records, chosen, least.tolist(), setup.span, zeros, gap.unseen)
     is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
     found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
     return Diagnosis(

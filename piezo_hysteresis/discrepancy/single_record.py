@@ -40,7 +40,7 @@ from .excitation_check import missing_excitation
 from .gap import Gap, measure_gap, with_stated_error
 from .next_experiment import best_next_experiment
 from .residual.localise import located
-from .residual.noise_floor import floors, noise_floors, stroke
+from .residual.noise_floor import floors, noise_floors, noise_of_averages, stroke
 from .residual.sampling import shortened
 from .search.baseline import as_conditioning, with_zero
 from .search.candidates import loop_is_off, score_model
@@ -94,7 +94,9 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     noise = noise_floors(records)
     least = floors(records, noise)
     short = shortened(records, SEARCHED)
-    training_data = training_data_of(short, fitted, noise, least, start)
+    quiet = noise_of_averages(noise, records, short)
+    short_least = floors(short, quiet)
+    training_data = training_data_of(short, fitted, quiet, short_least, start)
     baseline = joint(with_zero(published), training_data, LAST, SHARP)
     before = score_model(baseline.model, training_data)
     if before.excess > ADEQUATE:
@@ -106,7 +108,7 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     now, score = (found.fit, score_model(start, training_data)) if found else (baseline, before)
     several = has_several_drives(records, fitted)
     if found and found.structure and before.excess > ADEQUATE and several:
-        steps = structure_steps(found, before, training_data, short, least.tolist(), fitted)
+        steps = structure_steps(found, before, training_data, short, short_least.tolist(), fitted)
     is_certain = bool(steps)
     fitting = [e for e in state.effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
     with ending_at(state.end):

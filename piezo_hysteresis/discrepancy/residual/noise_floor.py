@@ -167,6 +167,20 @@ def noise_floors(records: Sequence[Record]) -> Array:
     return np.where(np.isfinite(scatter), np.clip(scatter, white, UNUSUAL * expected), expected)
 
 
+def noise_of_averages(noise: Array, before: Sequence[Record], after: Sequence[Record]) -> Array:
+    """Noise of records of which some were averaged [m], shape (r,); that of averages is estimated anew, from them.
+
+    Parameters
+    ----------
+    noise : (r,) ndarray
+        Noise of the records before [m].
+    before, after : sequence of Record
+        The records before and after; the averages are those with a longer sample period.
+    """
+    averaged = [a.sample_period > 1.001 * b.sample_period for a, b in zip(after, before, strict=True)]
+    return np.where(averaged, np.minimum(noise, noise_floors(after)), noise) if any(averaged) else noise
+
+
 def _speed(record: Record, noise: float) -> float:
     """RMS speed of the stage without the noise of the sensor [m/s]."""
     if record.size < 3:

@@ -19,7 +19,7 @@ Records with their floors, split and shortened, and the baseline fitted to them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -29,12 +29,13 @@ from numpy.typing import NDArray
 from ...effects.extent import Extent
 from ...errors import DivergenceError
 from ...identification.fit.fit import Fit, Progress
+from ...identification.fit.form_uncertainty import ADEQUACY
 from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.conditioning import records_to_fit
 from ...model.model import Model
 from ...record import Record
 from ..residual.intersample_error import intersample_error
-from ..residual.noise_floor import floors, noise_floors, stroke
+from ..residual.noise_floor import noise_floors, noise_of_averages, stroke
 from ..residual.sampling import at_period, common_period, less, shortened, slowed
 from .baseline import exact, modal_models, start_models
 from .candidates import score_baseline, score_model
@@ -68,7 +69,7 @@ class BaselineSetup:
     lost : list of (n,) ndarray
         The inter-sample error by record [m].
     noise, least : (r,) ndarray
-        Noise and floor of every record [m].
+        Noise and floor of every record [m]; those of the training records are lower where these are averages.
     span : float
         Range of the displacement [m].
     usable, fitted, test_records : sequence of int
@@ -94,15 +95,10 @@ class BaselineSetup:
     baseline: Fit
     score: Score
 
-    def for_last_fit(self, training_data: TrainingData) -> TrainingData:
-        """Training data with its records averaged or cut to about `FITTED` samples where they are longer."""
-        kept, _ = records_to_fit(shortened(self.records, FITTED), self.least.tolist(), self.fitted)
-        return replace(training_data, records=tuple(kept))
-
-    @property
-    def whole_noise(self) -> Array:
-        """Noise of those records [m]; infinite for a record that only determines the state of the stage."""
-        return np.array(records_to_fit(self.records, self.noise.tolist(), self.fitted)[1])
+    def for_last_fit(self) -> tuple[TrainingData, Array]:
+        """The training data, averaged or cut to about `FITTED` samples only where records are longer, and its noise."""
+        records, least, noise = _short(self.records, self.noise, self.lost, self.span, self.fitted, FITTED)
+        return replace(self.training_data, records=records, floors=least, noise=noise), noise
 
     def changes_intersample_error(self, model: Model) -> bool:
         """Whether the inter-sample error computed with this model differs by more than the floor of a record."""
@@ -143,10 +139,10 @@ def prepare_baseline(
     test_records = choose_test_records(records, usable)
     fitted = [i for i in usable if i not in test_records]
     noise, span = noise_floors(records), stroke(records)
-    least = floors(records, noise)
     at_full_rate = [r for r, g in zip(records, given, strict=True) if r.sample_period == g.sample_period]
     period = model.sample_period if model is not None else common_period(at_full_rate or records)
-    records = straight = tuple(at_period(r, period) for r in records)
+    straight = tuple(at_period(r, period) for r in records)
+    noise, records = noise_of_averages(noise, records, straight), straight
     first = known.baseline if known is not None else model
     starts = iter((first,)) if first is not None else start_models(records, fitted)
     start = exact(next(starts))
@@ -154,22 +150,20 @@ def prepare_baseline(
     earlier = known.training_data if known is not None else None
     unfitted = start if earlier is None else earlier.start
 
-    def gathered(records: Sequence[Record], least: Array) -> TrainingData:
-        kept, sizes = records_to_fit(shortened(records, SEARCHED), least.tolist(), fitted)
-        null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
-        return TrainingData(tuple(kept), np.array(sizes), Nuisance(), extent, start=unfitted, null=null)
+    def gathered(records: Sequence[Record], lost: Sequence[Array]) -> TrainingData:
+        kept, least, quiet = _short(records, noise, lost, span, fitted, SEARCHED)
+        return TrainingData(kept, least, Nuisance(), extent, start=unfitted, noise=quiet)
 
-    training_data = gathered(records, least)
+    lost = [np.zeros(r.size) for r in records]
+    training_data = gathered(records, lost)
     progress("joint fit of the baseline", 0.2)
     baseline = joint(start, training_data, LAST, PRECISE)
-    lost = [np.zeros(r.size) for r in records]
     if corrects_intersample_error:
         with suppress(DivergenceError):  # on a test record, which moves further than those that were fitted
             lost = intersample_error(known.model if known is not None else baseline.model, records)
     if any(c.any() for c in lost):
         records = less(records, lost)
-        least = np.hypot(least, [UNSURE * np.sqrt(np.mean(c**2)) for c in lost])
-        training_data = gathered(records, least)
+        training_data = gathered(records, lost)
         progress("joint fit of the baseline", 0.3)
         baseline = joint(baseline.model, training_data, LAST, PRECISE)
     training_data, score = score_baseline(baseline.model, training_data)
@@ -180,9 +174,25 @@ def prepare_baseline(
     if score.excess > ADEQUATE:
         for modal in modal_models(baseline.model, records, fitted):
             baseline, score = better_fit(modal, baseline, score, training_data, CLEARLY)
+    least = _floors(noise, span, lost)
     return BaselineSetup(
         straight, records, lost, noise, least, span, usable, fitted, test_records, training_data, baseline, score
     )
+
+
+def _floors(noise: Array, span: float, lost: Sequence[Array]) -> Array:
+    """Floors of records with this noise, and with a part of their inter-sample error [m]."""
+    return np.hypot(np.maximum(noise, ADEQUACY * span), [UNSURE * np.sqrt(np.mean(c**2)) for c in lost])
+
+
+def _short(
+    records: Sequence[Record], noise: Array, lost: Sequence[Array], span: float, fitted: Collection[int], most: int
+) -> tuple[tuple[Record, ...], Array, Array]:
+    """Training records with about `most` samples, their floors and their noise [m]."""
+    short = shortened(records, most)
+    noise = noise_of_averages(noise, records, short)
+    kept, least = records_to_fit(short, _floors(noise, span, lost).tolist(), fitted)
+    return tuple(kept), np.array(least), np.array(records_to_fit(short, noise.tolist(), fitted)[1])
 
 
 def better_fit(

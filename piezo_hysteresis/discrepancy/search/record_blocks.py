@@ -54,12 +54,11 @@ def training_data_of(
         Model with which the fit begins.
     """
     blocks, origin = blocks_of(records, fitted)
-    weights = np.array([np.inf if k is None else least[k] for k in origin])
+    weights, quiet = (np.array([np.inf if k is None else sizes[k] for k in origin]) for sizes in (least, noise))
     jumps = tuple(i for i, b in enumerate(blocks) if not b.continues and step_length(records[origin[i] or 0]) == b.size)
     extent = Extent.of([records[i] for i in fitted], model.voltage_scale, model.displacement_scale)
     free = Nuisance(offset=sum(not r.continues for r in records) > 1)
-    null = float(np.mean([(noise[i] / least[i]) ** 2 for i in fitted]))
-    return TrainingData(tuple(blocks), weights, free, extent, jumps, null=null)
+    return TrainingData(tuple(blocks), weights, free, extent, jumps, noise=quiet)
 
 
 def blocks_of(records: Sequence[Record], used: Collection[int]) -> tuple[list[Record], list[int | None]]:

@@ -57,8 +57,8 @@ class TrainingData:
         Indices of records that are the only ones of their kind or alone determine a parameter; never left out.
     start : Model, optional
         The model before any joint fit; its hysteresis was fitted to slow records only.
-    null : float
-        V of a perfect model: mean squared ratio of noise to floor.
+    noise : (r,) ndarray, optional
+        Noise of every record [m]; equal to the floors by default.
     """
 
     records: tuple[Record, ...]
@@ -67,13 +67,19 @@ class TrainingData:
     extent: Extent
     alone: tuple[int, ...] = ()
     start: Model | None = None
-    null: float = 1.0
+    noise: Array | None = None
 
     @property
     def begins_at_levels(self) -> bool:
         """Whether the stage had settled at more than one level, so that settling at rest can be determined."""
         levels = [r.settled_voltage for r in self.records if not r.continues]
         return bool(levels) and max(levels) - min(levels) > LEVELS_APART * self.extent.span
+
+    @property
+    def null(self) -> float:
+        """V of a perfect model: mean squared ratio of noise to floor."""
+        noise, counted = self.floors if self.noise is None else self.noise, np.isfinite(self.floors)
+        return float(np.mean((noise[counted] / self.floors[counted]) ** 2))
 
     def broadband(self) -> list[int]:
         """Records whose drive determines linear dynamics."""

@@ -126,7 +126,7 @@ def fitted_correction(
 
 def judged_on_test_records(correction: Correction, model: Model, setup: BaselineSetup) -> Correction:
     """The correction after the last fit to all samples, judged on the test records."""
-    training_data = setup.for_last_fit(setup.training_data)
+    training_data, _ = setup.for_last_fit()
     try:
         fit = joint(model.with_effect(correction.effect), training_data, LAST, PRECISE)
         both, nuisances = (model, fit.model), (training_data.nuisance, training_data.nuisance)

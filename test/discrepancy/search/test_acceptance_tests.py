@@ -38,7 +38,7 @@ EXTENT = Extent(0.0, 10.0, 1e3, 10.0, 1e-5, 2e-5, 100.0, 10.0, 10.0)
 def fitted(effect, names, covariance, null=1.0):
     model = Model((BoucWen(A=0.5, beta=3.0, gamma=0.5, p1=0.0, p2=1.0), effect), 2e-5, 10.0, 1e-5)
     result = Fit(model, names, np.asarray(covariance), 1.0, (), (), (), True, 3)
-    training_data = TrainingData((), np.array([]), Nuisance(), EXTENT, null=null)
+    training_data = TrainingData((), np.ones(1), Nuisance(), EXTENT, noise=np.full(1, np.sqrt(null)))
     return FittedCandidate(effect, training_data, Score(np.ones(3), np.zeros(len(names))), result)
 
 

@@ -15,7 +15,9 @@
 """The baseline begins wherever there are loops, whatever the broadband records show."""
 
 import numpy as np
+import pytest
 
+from piezo_hysteresis.discrepancy.residual.noise_floor import noise_floors
 from piezo_hysteresis.discrepancy.search import baseline_setup
 from piezo_hysteresis.discrepancy.search.baseline import exact, start_models
 from piezo_hysteresis.discrepancy.search.cross_validation import Score
@@ -65,3 +67,18 @@ def test_a_start_from_which_the_fit_fails_hides_no_later_one(monkeypatch):
     for start in (second, third):
         found = baseline_setup.better_fit(start, *found, training_data)
     assert found[0].model is third
+
+
+def test_the_floor_of_averages_is_that_of_the_same_data_recorded_at_that_rate():
+    model = exact(Model((BoucWen(), Arx(a=(), b=(1.0,), delay=1)), PERIOD, 10.0, 1e-5))
+    drive = 10.0 * (1.0 - np.abs(np.linspace(-1.0, 1.0, 18_000)))
+    (moved,) = model.free_run([Record(drive, drive, 1e-3, "triangle")])
+    noise = 3e-8 * np.random.default_rng(2).normal(size=(3, drive.size))
+    records = [Record(drive, moved + e, 1e-3, "triangle") for e in noise]
+    setup = baseline_setup.prepare_baseline(records, range(3), model, None, False, lambda word, part: None)
+    averages = [records[i].decimate(3) for i in setup.fitted]
+    assert [r.size for r in setup.training_data.records] == [r.size for r in averages]
+    np.testing.assert_allclose(setup.training_data.floors, noise_floors(averages), rtol=1e-6)
+    whole, _ = setup.for_last_fit()
+    np.testing.assert_allclose(whole.floors, setup.least[list(setup.fitted)], rtol=1e-6)
+    assert setup.training_data.null == whole.null == pytest.approx(1.0)

@@ -40,6 +40,6 @@ def test_explained_stays_between_nothing_and_all():
 
 def test_nothing_is_tried_on_a_model_that_is_adequate():
     score = Score(np.sqrt(np.full(5, ADEQUATE)), np.empty(0))
-    found = select(None, TrainingData((), np.empty(0), None, None), score)
+    found = select(None, TrainingData((), np.ones(1), None, None), score)
     assert isinstance(found, Selection)
     assert found.steps == found.accepted == ()
