@@ -26,8 +26,8 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..blocks.block import Array
 from ..effects import BoucWen
 from ..effects.hysteresis.explicit_bouc_wen import ExplicitBoucWen
 from ..identification.fit.normal_equations import grams
@@ -40,8 +40,6 @@ from .search.candidates import adjusted_numbers, directions
 from .search.cross_validation import cross_validate
 from .search.refit import FAILURES, joint
 from .search.training_data import TrainingData
-
-Array = NDArray[np.float64]
 
 KIND = "explicit_step"
 """Kind of the notice about an experiment from which the error was subtracted."""

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from ..identification.fit.normal_equations import Nuisance
 from ..model.model import Model
@@ -30,8 +29,6 @@ from ..record import Record
 from .residual.residual import residuals_on
 from .search.cross_validation import ADEQUATE
 from .search.selection_result import explained
-
-Array = NDArray[np.float64]
 
 FALLS = 0.9
 """Largest ratio of V after to V before, on the test records, with which an effect is named."""

@@ -24,7 +24,6 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from ...identification.fit.form_uncertainty import PIECES
 from ..diagnosis import Diagnosis, Verdict
@@ -32,8 +31,6 @@ from ..search.cross_validation import ADEQUATE, Score
 from ..search.selection_result import Step
 from ..verdict import FAR, NAMED, NAMED_FAR
 from .time_to_decide import ONE_RECORD
-
-Array = NDArray[np.float64]
 
 NOTHING, NONE_OF_THESE = "nothing", "none of these"
 """The two explanations that are not effects of the catalogue."""

@@ -24,7 +24,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from ...effects import Effect
 from ...identification.fit.covariance import sandwich
@@ -37,8 +36,6 @@ from ..search.candidates import adjusted_numbers, directions
 from ..search.cross_validation import ADEQUATE
 from ..search.refit import FAILURES
 from ..search.training_data import TrainingData
-
-Array = NDArray[np.float64]
 
 
 def still_hidden(

@@ -20,13 +20,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
 
+from ...blocks.block import Array
 from ...errors import RecordError
-
-Array = NDArray[np.float64]
 
 FALSE_ALARMS = 0.01
 """Probability that any lag of an independent residual exceeds the bounds; it applies to all lags together."""

@@ -23,13 +23,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...blocks.block import Array
 from ...model.model import Model
 from ...record import Record
 from .quick_dynamics import quick_dynamics
-
-Array = NDArray[np.float64]
 
 PARTS = 16
 """Largest number of parts into which a sample is divided."""

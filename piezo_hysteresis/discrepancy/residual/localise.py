@@ -23,12 +23,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...blocks.block import Array
 from ...identification.fit.normal_equations import Nuisance
 from ...model.model import Model
 from ...record import Record
 from .residual import residuals_on
 
-Array = NDArray[np.float64]
 Bins = NDArray[np.intp]
 
 FREQUENCIES = np.array([0.0, 0.5, 5.0, 25.0, 75.0, 150.0, 250.0, 350.0, 600.0, 1.2e3, 2.5e3, np.inf])

@@ -25,14 +25,12 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ...blocks.block import Array
 from ...channel_mapping import quantity_of
 from ...identification.fit.form_uncertainty import ADEQUACY
 from ...identification.records.excitation_content import noise_on_motion
 from ...record import Experiment, Record
-
-Array = NDArray[np.float64]
 
 MAINS = (50.0, 60.0)
 """Mains frequencies [Hz]."""

@@ -21,12 +21,9 @@ records G is a gain and a delay, so these poles have no influence.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...effects import Arx
 from ...model.model import Model
-
-Array = NDArray[np.float64]
 
 SMALL = 0.1
 """Largest share of the response of a relaxation that counts as creep; that of a slow amplifier is larger."""

@@ -25,8 +25,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...blocks.block import Array
 from ...effects import MainsHum
 from ...errors import RecordError
 from ...identification.fit.normal_equations import Nuisance, residuals
@@ -34,8 +34,6 @@ from ...identification.records.conditioning import with_conditioning
 from ...model.model import Model
 from ...record import CONDITIONING, Experiment, Record
 from .noise_floor import stroke
-
-Array = NDArray[np.float64]
 
 SINE = re.compile(r"sine_([0-9.]+)hz")
 """Phase name of a sine, with its frequency [Hz]."""
@@ -177,16 +175,13 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
             f"displacement is {experiment[0].displacement[0]:g} m in every sample, expected a stage that moves; "
             "check the sensor and its column"
         )
-    free_run = model.free_run(experiment)
+    free_run, zero = model.free_run(experiment), 0.0
     if nuisance is None:
         means = np.array([np.mean(r.displacement - y) for r, y in zip(experiment, free_run, strict=True)])
         known = np.array([_has_known_start(r) for r in experiment])
         zero = float(means[known if known.any() else ~known].mean())
-        hum = hum_of(model)
-        predicted = [_with_nuisance(r, y + zero, hum) for r, y in zip(experiment, free_run, strict=True)]
-    else:
-        zero = 0.0
-        predicted = [_with_nuisance(r, y, nuisance) for r, y in zip(experiment, free_run, strict=True)]
+        nuisance = hum_of(model)
+    predicted = [_with_nuisance(r, y + zero, nuisance) for r, y in zip(experiment, free_run, strict=True)]
     residuals = [r.displacement - y for r, y in zip(experiment, predicted, strict=True)]
     rows = [_row(i, r, e, span) for i, (r, e) in enumerate(zip(experiment, residuals, strict=True))]
     return Errors(span, zero, tuple(rows), tuple(predicted), tuple(residuals))

@@ -26,13 +26,11 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ...blocks.block import Array
 from ...effects.drive.backlash import run_play
 from ...identification.records.excitation_content import excitation_content, noise_on_motion
 from ...record import Record
-
-Array = NDArray[np.float64]
 
 FEWEST_BENDS = 50
 """Smallest number of second differences of a voltage for an estimate of its noise."""

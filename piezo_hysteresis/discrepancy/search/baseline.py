@@ -67,9 +67,9 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
         A start for the joint fit.
     """
     experiment = Experiment(tuple(records))
-    roles, at_full_rate = roles_of(experiment), _at_full_rate(experiment, fitted)
+    roles = roles_of(experiment)
     loops = [i for i in roles.loops if i in fitted]
-    broadband, moving = _telling_dynamics(roles, fitted, at_full_rate)
+    at_full_rate, broadband, moving = _telling_dynamics(experiment, roles, fitted)
     if not loops or not broadband:
         known = Experiment(experiment.records[: max(fitted) + 1])
         aside = {i for i in range(len(known.records)) if i not in fitted}
@@ -110,7 +110,7 @@ def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int
         Starts for the joint fit: from broadband records, and from all records that move.
     """
     experiment = Experiment(tuple(records))
-    broadband, moving = _telling_dynamics(roles_of(experiment), fitted, _at_full_rate(experiment, fitted))
+    _, broadband, moving = _telling_dynamics(experiment, roles_of(experiment), fitted)
     if not broadband:
         return
     for chosen in (broadband, moving) if moving != broadband else (broadband,):
@@ -125,16 +125,13 @@ def as_conditioning(experiment: Experiment, aside: Collection[int]) -> Experimen
     return Experiment(records, experiment.source)
 
 
-def _at_full_rate(experiment: Experiment, fitted: Collection[int]) -> list[int]:
-    return [i for i in fitted if experiment[i].sample_period < 1.001 * experiment.fastest_period]
-
-
 def _telling_dynamics(
-    roles: Roles, fitted: Collection[int], at_full_rate: Collection[int]
-) -> tuple[list[int], list[int]]:
-    """Broadband records, and all records at the full rate that move; sines alone do not determine the dynamics."""
+    experiment: Experiment, roles: Roles, fitted: Collection[int]
+) -> tuple[list[int], list[int], list[int]]:
+    """Records at the full rate, broadband ones, and moving ones at it; sines alone do not determine the dynamics."""
     broadband = [i for i in roles.broadband if i in fitted]
-    return broadband, [i for i in at_full_rate if broadband and not roles.contents[i].is_slow]
+    at_full_rate = [i for i in fitted if experiment[i].sample_period < 1.001 * experiment.fastest_period]
+    return at_full_rate, broadband, [i for i in at_full_rate if broadband and not roles.contents[i].is_slow]
 
 
 def _with_dynamics(

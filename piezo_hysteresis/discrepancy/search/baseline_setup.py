@@ -24,8 +24,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...blocks.block import Array
 from ...effects.extent import Extent
 from ...errors import DivergenceError
 from ...identification.fit.fit import Fit, Progress
@@ -45,8 +45,6 @@ from .refit import FAILURES, LAST, PRECISE, joint
 from .selection_result import Selection
 from .test_records import choose_test_records
 from .training_data import TrainingData
-
-Array = NDArray[np.float64]
 
 SEARCHED, FITTED = 6_000, 50_000
 """Largest number of samples of a record, approximately, in the search and in the last fit."""
@@ -147,8 +145,7 @@ def prepare_baseline(
     starts = iter((first,)) if first is not None else start_models(records, fitted)
     start = exact(next(starts))
     extent = Extent.of([records[i] for i in usable], start.voltage_scale, start.displacement_scale)
-    earlier = known.training_data if known is not None else None
-    unfitted = start if earlier is None else earlier.start
+    unfitted = start if known is None or known.training_data is None else known.training_data.start
 
     def gathered(records: Sequence[Record], lost: Sequence[Array]) -> TrainingData:
         kept, least, quiet = _short(records, noise, lost, span, fitted, SEARCHED)

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TypeVar
 
 from ...effects.effect import ChainPosition
 from ...identification.fit.fit import Progress
@@ -45,6 +46,7 @@ FEWEST_STARTS = 3
 TIE = 0.02
 """Difference in gain up to which the form and the effect with the fewest parameters are taken."""
 
+AnyCandidate = TypeVar("AnyCandidate", bound=Candidate)
 Fitter = Callable[[Candidate], FittedCandidate | None]
 """Fits a candidate; None if this diverges."""
 
@@ -53,25 +55,30 @@ def refit_candidates(
     model: Model, candidates: Sequence[Candidate], before: Score, progress: Progress
 ) -> list[FittedCandidate]:
     """Joint refits, best first: few linearisations for all, then new dynamics, then convergence for the best ones."""
-    refits: list[FittedCandidate] = []
     progress("refits of the candidates", 0.2)
     first = partial(refit, model, max_iterations=FIRST)
-    for _, result in on_cores(first, candidates, lambda c: not any(_is_far_behind(c, r, before) for r in refits)):
-        if result is not None:
-            refits.append(result)
+    refits = _collected(first, candidates, lambda c, found: not any(_is_far_behind(c, r, before) for r in found))
     refits.sort(key=_cost)
     progress("new estimate of the dynamics", 0.6)
-    anew = list[FittedCandidate]()
-    for _, result in on_cores(_anew, refits[:AGAIN], lambda c: not (anew and _is_far_behind(c, anew[0], before))):
-        anew.append(result)
+    best = refits[:AGAIN]
+    anew = _collected(_anew, best, lambda c, found: not (found and _is_far_behind(c, found[0], before)))
     field = _replaced(refits, anew)
     progress("refits of the best candidates", 0.8)
+    last = partial(settled, before=before)
+    return _replaced(field, _collected(last, field, lambda c, found: not found or _is_close(c, found[0], before)))
+
+
+def _collected(
+    fit: Callable[[AnyCandidate], FittedCandidate | None],
+    candidates: Sequence[AnyCandidate],
+    wanted: Callable[[AnyCandidate, list[FittedCandidate]], bool] = lambda candidate, found: True,
+) -> list[FittedCandidate]:
+    """Fits of the candidates that are wanted beside those found before, without the fits that diverged."""
     found = list[FittedCandidate]()
-    for _, result in on_cores(
-        partial(settled, before=before), field, lambda c: not found or _is_close(c, found[0], before)
-    ):
-        found.append(result)
-    return _replaced(field, found)
+    for _, result in on_cores(fit, candidates, lambda candidate: wanted(candidate, found)):
+        if result is not None:
+            found.append(result)
+    return found
 
 
 def _replaced(before: list[FittedCandidate], after: list[FittedCandidate]) -> list[FittedCandidate]:
@@ -83,12 +90,7 @@ def _replaced(before: list[FittedCandidate], after: list[FittedCandidate]) -> li
 def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
     """Refits of effects of the drive and the loop that the dynamics have absorbed, so that no score test shows them."""
     bending = [c for c in candidates if _bends_dynamics(c)]
-    return _all_settled(partial(from_all_starts, model, max_iterations=FIRST), bending, before)
-
-
-def _all_settled(fit: Fitter, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
-    found = on_cores(partial(_settled, fit, before), candidates)
-    return [c for _, c in found if c is not None]
+    return _collected(partial(_settled, partial(from_all_starts, model, max_iterations=FIRST), before), bending)
 
 
 def _settled(fit: Fitter, before: Score, candidate: Candidate) -> FittedCandidate | None:
@@ -109,7 +111,8 @@ def refits_of_twins(candidates: Sequence[Candidate], best: FittedCandidate, befo
     Each refit begins with the fitted model of the best one, because the loop is the same.
     """
     twins = [c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name]
-    return _all_settled(partial(refit, best.fit.model.without(best.name), max_iterations=LATER), twins, before)
+    from_best = partial(refit, best.fit.model.without(best.name), max_iterations=LATER)
+    return _collected(partial(_settled, from_best, before), twins)
 
 
 def _anew(candidate: FittedCandidate) -> FittedCandidate:

@@ -27,8 +27,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...blocks.block import Array
 from ...effects import Arx, Effect, MainsHum, Offset
 from ...errors import DivergenceError, ModelError, ParameterError
 from ...identification.fit.bounded_step import room_of
@@ -38,8 +38,6 @@ from ...model.model import Model
 from .cross_validation import Score, cross_validate, indispensable
 from .execution.cores import on_cores
 from .training_data import TrainingData
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

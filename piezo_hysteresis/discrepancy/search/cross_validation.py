@@ -24,11 +24,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...blocks.block import Array
 from ...identification.fit.normal_equations import Gram
-
-Array = NDArray[np.float64]
 
 ADEQUATE = 1.5
 """Mean R² up to which nothing is missing beyond noise."""

@@ -19,8 +19,8 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...blocks.block import Array
 from ...effects.extent import Extent
 from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.conditioning import with_conditioning
@@ -28,8 +28,6 @@ from ...identification.records.leading_step import step_length
 from ...model.model import Model
 from ...record import Record
 from .training_data import TrainingData
-
-Array = NDArray[np.float64]
 
 BLOCKS = 16
 """Approximate number of blocks into which the records are cut."""

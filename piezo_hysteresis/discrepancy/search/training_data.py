@@ -20,16 +20,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...blocks.block import Array
 from ...effects import MainsHum
 from ...effects.extent import Extent
 from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.excitation_content import excitation_content
 from ...model.model import Model
 from ...record import Record
-
-Array = NDArray[np.float64]
 
 LEVELS_APART = 0.05
 """Smallest difference between two initial levels of records, as a share of the voltage range."""

@@ -25,16 +25,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...blocks.block import Array
 from ...identification.fit.bounded_step import bounded_step, room_of
 from ...identification.fit.normal_equations import grams
 from ...identification.records.excitation_content import excitation_content
 from ...model.model import Model
 from ..search.candidates import adjusted_numbers, directions
 from ..search.training_data import TrainingData
-
-Array = NDArray[np.float64]
 
 GROUPS = 3
 """Groups of similar rate, and of similar amplitude: slow, middle and fast; small, middle and large."""

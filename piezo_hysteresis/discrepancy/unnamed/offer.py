@@ -20,8 +20,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...blocks.block import Array
 from ...effects import Creep, Offset, UnnamedCorrection, UnnamedPlays, UnnamedPositionMap, UnnamedRelaxation
 from ...identification.identified_range import identified_range
 from ...model.model import Model
@@ -33,8 +33,6 @@ from ..search.selection_result import explained
 from ..search.training_data import TrainingData
 from .correction import Correction, corrections_in
 from .held_out import HeldOut, held_out, rate_and_amplitude_groups
-
-Array = NDArray[np.float64]
 
 HEIGHTS = (15, 47)
 """Numbers of grid points of the position maps that are tried: smooth, and with a period of a tenth of the travel."""
