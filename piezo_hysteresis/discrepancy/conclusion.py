@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -72,36 +73,31 @@ def concluded(
     given : Model, optional
         Model that the user gave. The gap before is its own error, not that after a joint fit.
     """
-    records, least, training_data = setup.records, setup.least, setup.training_data
     progress("gap", 0.85)
     named = is_explained(selection)
     whole, noise = setup.for_last_fit()
+    least, zero = setup.least.tolist(), setup.training_data.nuisance
     first = joint(selection.baseline, whole, LAST, PRECISE)
-    final, free = first, training_data.nuisance
+
+    def gap_of(last: Fit, nuisance: Nuisance, chosen: Sequence[int]) -> Gap:
+        models, nuisances, unseen = (first.model, last.model), (zero, nuisance), chosen is setup.test_records
+        return measure_gap(models, setup.records, chosen, least, setup.span, nuisances, unseen)
+
+    tested = setup.test_records or setup.fitted
+    falls = diverges = False
     if named:
         free = selection.accepted[-1].best.training_data.nuisance
         final = _finished(selection, replace(whole, nuisance=free))
-    unseen = tuple(setup.test_records)
-
-    def gap_of(last: Fit, nuisance: Nuisance) -> Gap:
-        models, nuisances = (first.model, last.model), (training_data.nuisance, nuisance)
-        chosen = unseen or tuple(setup.fitted)
-        return measure_gap(models, records, chosen, least.tolist(), setup.span, nuisances, bool(unseen))
-
-    falls = diverges = False
-    if named:
         with suppress(DivergenceError):  # on a test record, which moves further than those that were fitted
-            gap = gap_of(final, free)
+            gap = gap_of(final, free, tested)
             falls = gap.falls
     if not falls:
-        final, free = first, training_data.nuisance
+        final, free = first, zero
         try:
-            gap = gap_of(first, free)
+            gap = gap_of(first, zero, tested)
         except DivergenceError:
-            if not unseen:
-                raise
-            diverges, unseen = True, ()
-            gap = gap_of(first, free)
+            diverges = True
+            gap = gap_of(first, zero, setup.fitted)
     final = with_form_uncertainty(final, whole.records, free, whole.floors, noise, setup.span)
     progress("next experiment", 0.95)
     if diverges:
@@ -110,9 +106,9 @@ def concluded(
         conclusion, reason = conclusion_of(selection, falls, falls or not named, gap)
     if given is not None:
         chosen = tuple(p.index for p in gap.per_phase)
-        zeros = replace(training_data.nuisance, offset=True), replace(free, offset=True)
+        zeros = replace(zero, offset=True), replace(free, offset=True)
         with suppress(DivergenceError):
-            gap = measure_gap((given, final.model), records, chosen, least.tolist(), setup.span, zeros, gap.unseen)
+            gap = measure_gap((given, final.model), setup.records, chosen, least, setup.span, zeros, gap.unseen)
     is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
     found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
     return Diagnosis(
@@ -124,8 +120,8 @@ def concluded(
         fit=final,
         where=where,
         gap=gap,
-        next_experiment=best_next_experiment(selection, training_data),
-        experiment=experiment.noting(*missing_excitation([records[i] for i in setup.usable], found)),
+        next_experiment=best_next_experiment(selection, setup.training_data),
+        experiment=experiment.noting(*missing_excitation([setup.records[i] for i in setup.usable], found)),
         correction=best_correction(final.model, setup) if is_unexplained else None,
     )
 

@@ -107,13 +107,10 @@ class Diagnosis(Pictured):
         rejections: dict[str, Rejection] = {}
         for step in self.selection.steps:
             if self.verdict is Verdict.UNKNOWN and step.accepted:
-                closed = self.selection.explained(step.best.score)
-                kept = self.model is not None and step.best.name in self.model
-                said = f"it is in the model but not named: up to it, {100 * closed:.0f} % of the gap are explained"
-                rejections[step.best.name] = Rejection(
-                    step.best.name,
-                    said if kept else f"it is the closest effect, but explains only {100 * closed:.0f} % of the gap",
-                )
+                name, closed = step.best.name, f"{100 * self.selection.explained(step.best.score):.0f} % of the gap"
+                kept = f"it is in the model but not named: up to it, {closed} are explained"
+                closest = f"it is the closest effect, but explains only {closed}"
+                rejections[name] = Rejection(name, kept if self.model is not None and name in self.model else closest)
             for rejection in step.rejected:
                 rejections[rejection.name] = rejection
         forms = {e.name for e in CHAIN if e.public_name() in self.names}
@@ -178,14 +175,7 @@ class Diagnosis(Pictured):
             "where": [{"axis": p.axis, "share": round(p.share, 4), "detail": p.detail} for p in self.where],
             "gap_percent_of_range": self._gap(),
             "rejected": [asdict(r) for r in self.rejected],
-            "next_experiment": None
-            if (following := self.next_experiment) is None
-            else {
-                "phase": following.drive,
-                "separates": list(following.rivals),
-                "reason": following.sentence(),
-                **following.numbers(),
-            },
+            "next_experiment": None if self.next_experiment is None else self.next_experiment.answer(),
             "data_quality": [asdict(n) for n in self.experiment.notices],
             "unnamed_correction": None if self.correction is None else self.correction.answer(),
             "model": model_file,
@@ -211,12 +201,10 @@ class Diagnosis(Pictured):
                 lines.append(f"    the data cannot distinguish it from {', '.join(row['confusable_with'])}")
         if self.gap is not None:
             g = self.gap
-            seen = (
-                "on the test records"
-                if g.unseen
-                else "on the training records, because there were too few for test records"
+            seen = "test records" if g.unseen else "training records, because there were too few for test records"
+            lines.append(
+                f"  gap {g.before:.3g} % → {g.after:.3g} % of range, noise floor {g.floor:.3g} % (on the {seen})"
             )
-            lines.append(f"  gap {g.before:.3g} % → {g.after:.3g} % of range, noise floor {g.floor:.3g} % ({seen})")
         if self.correction is not None:
             lines.append(f"  {self.correction.sentence()}")
         lines += [f"  where: {p.axis.replace('_', ' ')}: {p.detail}" for p in self.where[:3]]

@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
+from ..blocks.block import Array
 from ..identification.fit.normal_equations import Nuisance
 from ..model.model import Model
 from ..model.provenance import LARGEST, free_run
@@ -134,14 +135,13 @@ def measure_gap(
         If a model diverges on one of the chosen records, or on one that it continues.
     """
 
-    def left_by(model: Model, nuisance: Nuisance) -> list[float]:
+    def left_by(model: Model, nuisance: Nuisance) -> Array:
         left = residuals_on(model, records, chosen, nuisance)
-        return [100.0 * float(np.sqrt(np.mean(e**2))) / stroke for e in left]
+        return np.array([100.0 * float(np.sqrt(np.mean(e**2))) / stroke for e in left])
 
-    rows = [left_by(model, nuisance) for model, nuisance in zip(models, nuisances, strict=True)]
-    before, after = np.array(rows[0]), np.array(rows[1])
+    before, after = map(left_by, models, nuisances)
     steady = replace(nuisances[1], hum_frequency=None)
-    live = rows[1] if steady == nuisances[1] else left_by(models[1], steady)
+    live = after if steady == nuisances[1] else left_by(models[1], steady)
     least = 100.0 * np.array([floors[i] for i in chosen]) / stroke
     squares = after**2
     mean, interval = float(squares.mean()), None

@@ -129,20 +129,14 @@ def conclusion_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> t
     is_adequate = many and gap.after <= TEST_ADEQUATE * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
     if not selection.accepted and (is_adequate or selection.score.excess <= ADEQUATE):
         if gap.after > TEST_INADEQUATE * gap.floor:
-            message = f"the error on the test records is {gap.after / gap.floor:.1f} times the noise floor"
-            return (
-                Conclusion.INSUFFICIENT_DATA,
-                f"No effect is named: the training records show no missing effect, but {message}.",
-            )
-        return (
-            Conclusion.NOTHING_MISSING,
-            f"No effect is missing: the error is at the noise floor (at least {100 * ADEQUACY:g} % of the range).",
-        )
+            times = f"the error on the test records is {gap.after / gap.floor:.1f} times the noise floor"
+            said = f"No effect is named: the training records show no missing effect, but {times}."
+            return Conclusion.INSUFFICIENT_DATA, said
+        said = f"No effect is missing: the error is at the noise floor (at least {100 * ADEQUACY:g} % of the range)."
+        return Conclusion.NOTHING_MISSING, said
     if selection.accepted and not falls:
-        return (
-            Conclusion.INSUFFICIENT_DATA,
-            f"No effect is named: {names} reduced the error on the training records, but not on the test records.",
-        )
+        said = f"No effect is named: {names} reduced the error on the training records, but not on the test records."
+        return Conclusion.INSUFFICIENT_DATA, said
     message = ""
     if selection.steps:
         closest = selection.steps[0].best

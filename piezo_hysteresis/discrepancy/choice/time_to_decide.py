@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -80,6 +81,10 @@ class Separation:
             "expected_z": self.expected_z,
             "needed_z": self.needed_z,
         }
+
+    def answer(self) -> dict[str, Any]:
+        """The next experiment as in ``answer.json``."""
+        return {"phase": self.drive, "separates": list(self.rivals), "reason": self.sentence(), **self.numbers()}
 
     def sentence(self) -> str:
         """The separation in words."""
