@@ -151,17 +151,9 @@ def shortened(records: Sequence[Record], most: int) -> tuple[Record, ...]:
 
 
 def _is_alike(record: Record, most: int) -> bool:
-    part, whole = record.voltage[:most], record.voltage
-
-    def close(a: float, b: float) -> bool:
-        return abs(a - b) <= ALIKE * b
-
-    fast = float(np.mean(np.abs(np.diff(whole, 2)))) > FAST * float(whole.std())
-    return (
-        fast
-        and close(float(part.std()), float(whole.std()))
-        and close(float(np.diff(part).std()), float(np.diff(whole).std()))
-    )
+    u = record.voltage
+    fast = bool(np.mean(np.abs(np.diff(u, 2))) > FAST * u.std())
+    return fast and all(abs(v[: most - k].std() - v.std()) <= ALIKE * v.std() for k, v in enumerate((u, np.diff(u))))
 
 
 def common_period(records: Sequence[Record]) -> float:

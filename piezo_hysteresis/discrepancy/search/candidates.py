@@ -82,18 +82,15 @@ def adjusted_numbers(model: Model, training_data: TrainingData) -> list[str]:
 
     `settling` of the offset is not adjusted if all records start at one level, because the data do not determine it.
     """
-    names = []
-    for name in model.values():
-        row = model.row(name)
-        if not (row.fixed or row.per_record or name == f"{Arx.name}.delay"):
-            names.append(name)
-    skipped = {f"{Offset.name}.y0"} if training_data.nuisance.offset else set()
+    skipped = {f"{Arx.name}.delay", f"{MainsHum.name}.f"}
+    if training_data.nuisance.offset:
+        skipped.add(f"{Offset.name}.y0")
     if training_data.nuisance.offset or not training_data.begins_at_levels:
         skipped.add(f"{Offset.name}.settling")
-    skipped |= {f"{MainsHum.name}.f"}
     if loop_is_off(model):  # it stays off
         skipped |= {f"{model.hysteresis.name}.{n}" for n in model.hysteresis.memory_names}
-    return [n for n in names if n not in skipped]
+    rows = {n: model.row(n) for n in model.values() if n not in skipped}
+    return [n for n, row in rows.items() if not (row.fixed or row.per_record)]
 
 
 def loop_is_off(model: Model) -> bool:

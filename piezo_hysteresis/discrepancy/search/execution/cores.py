@@ -27,7 +27,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from queue import SimpleQueue
@@ -35,7 +35,6 @@ from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 
-from ....errors import PiezoError
 from ....identification.one_core import on_one_core
 from .time_limit import end_of_search, ending_at
 
@@ -44,10 +43,6 @@ Result = TypeVar("Result")
 
 MOST = 4
 """Largest number of cores that are used; loops of the search have about this number of long items."""
-
-
-class _NoHelperError(PiezoError):
-    """A helper has not computed an item."""
 
 
 class _Helpers:
@@ -142,8 +137,9 @@ def on_cores(
         yield from ((item, function(item)) for item in items if wanted(item))
         return
     end = end_of_search()
-    jobs = [pool.submit(_by_helper, function, item, wanted, end) for item in items[1:]]
-    jobs.insert(0, _cancelled())  # the first item decides what else is wanted, so it never waits for a helper
+    own: Future[Any] = Future()  # the first item decides what else is wanted, so it never waits for a helper
+    own.cancel()
+    jobs = [own, *(pool.submit(_by_helper, function, item, wanted, end) for item in items[1:])]
     try:
         for k, item in enumerate(items):
             if not wanted(item):
@@ -166,12 +162,6 @@ def _usable() -> int:
     if wanted.isdecimal():
         return int(wanted)
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _cancelled() -> Future[Any]:
-    future: Future[Any] = Future()
-    future.cancel()
-    return future
 
 
 def _computed(function: Callable[[Item], Result], item: Item) -> Future[Result]:
@@ -200,11 +190,11 @@ def _by_helper(function: Callable[[Item], Result], item: Item, wanted: Callable[
     """Send an item to the process of this thread and wait for its result."""
     process = _thread.process
     if not wanted(item):
-        raise _NoHelperError
+        raise CancelledError
     _send(process.stdin, (function, item, end))
     is_computed, result = pickle.loads(pickle.load(process.stdout))
     if not is_computed:
-        raise _NoHelperError
+        raise CancelledError
     return result
 
 
