@@ -27,9 +27,9 @@ from .changes.same_stage import same_stage
 from .diagnosis import Conclusion, Diagnosis
 from .diagnosis_state import VOLTAGE_NOISE, DiagnosisState
 from .excitation_check import check_motion, moves
-from .single_record import diagnose_few
 from .many_records import diagnose_many
 from .residual.sampling import NOISE_WIDTH, is_faster, quieted, resampled, voltage_noise
+from .single_record import diagnose_few
 from .unnamed.correction import without_corrections
 from .verdict import FEWEST_RECORDS
 
