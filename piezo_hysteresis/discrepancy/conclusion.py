@@ -71,7 +71,8 @@ def concluded(
     progress : callable
         Called with a message and the fraction done.
     given : Model, optional
-        Model that the user gave. The gap before is its own error, not that after a joint fit.
+        Model that the user gave. The gap before is its own error, not that after a joint fit. It stays the model where
+        no effect is named and the joint fit predicts the test records worse.
     """
     progress("gap", 0.85)
     named = is_explained(selection)
@@ -104,20 +105,24 @@ def concluded(
         conclusion, reason = Conclusion.INSUFFICIENT_DATA, DIVERGES
     else:
         conclusion, reason = conclusion_of(selection, falls, falls or not named, gap)
+    delivered, fit = final.stated_model, final
     if given is not None:
         chosen = tuple(p.index for p in gap.per_phase)
         zeros = replace(zero, offset=True), replace(free, offset=True)
         with suppress(DivergenceError):
-            gap = measure_gap((given, final.model), setup.records, chosen, least, setup.span, zeros, gap.unseen)
+            gap = measure_gap((given, delivered), setup.records, chosen, least, setup.span, zeros, gap.unseen)
+            if not falls and gap.after > gap.before:  # a refit that names nothing must not predict worse
+                delivered, fit = given, None
+                gap = measure_gap((given, given), setup.records, chosen, least, setup.span, zeros, gap.unseen)
     is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
     found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
     return Diagnosis(
         conclusion=conclusion,
         reason=reason,
-        model=with_stated_error(final.stated_model, gap.live, setup.span),
+        model=with_stated_error(delivered, gap.live, setup.span),
         baseline=with_stated_error(first.stated_model if given is None else given, gap.before, setup.span),
         selection=selection,
-        fit=final,
+        fit=fit,
         where=where,
         gap=gap,
         next_experiment=best_next_experiment(selection, setup.training_data),

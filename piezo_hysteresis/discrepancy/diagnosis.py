@@ -50,16 +50,16 @@ class Diagnosis(Pictured):
     reason : str
         What was found and why, in one or a few sentences.
     model : Model
-        The model with the named effects; without any, the refitted baseline.
+        The model with the named effects; without any, the refitted baseline, or a given model that predicts better.
     baseline : Model
-        The refitted model without the effects.
+        The given model; without one, the refitted model without the effects.
     experiment : Experiment
         Experiment that was compared with the model, without the noise of a measured voltage. Its notices describe the
         quality of the data, and the effects that the data cannot show.
     selection : Selection or None
         Every step of the search; None if the data did not allow a search.
     fit : Fit or None
-        Last joint fit, with uncertainties.
+        Last joint fit, with uncertainties; None if the model is not from it.
     where : tuple of ResidualShare
         Distribution of the residual of the baseline.
     gap : Gap or None
