@@ -28,7 +28,7 @@ from piezo_hysteresis.effects import Arx, BoucWen, Softening
 from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.model.model import Model
-from piezo_hysteresis.record import Experiment
+from piezo_hysteresis.record import Experiment, Record
 
 PERIOD = 5e-4
 STAGE = Nanopositioner(mode=310.0, delay=2e-4, pole=2e-4)
@@ -61,3 +61,19 @@ def test_a_given_model_that_diverges_is_replaced_by_an_identified_one(frequencie
     found = diagnose(experiment, unstable)
     assert [n.kind for n in found.experiment.notices].count(GIVEN_DIVERGES) == 1
     assert found.gap.after < 0.5
+
+
+@pytest.mark.parametrize(("period", "frequencies"), [(1e-4, (1.0, 5.0, 20.0, 60.0)), (5e-5, (1.0, 10.0, 60.0))])
+def test_a_step_at_the_beginning_of_a_long_record_is_not_averaged(period, frequencies):
+    pole = np.exp(-period / 1.4e-3)
+    truth = Model((BoucWen(), Arx(a=(-pole,), b=(1.0 - pole,))), period, 2.0, 1e-5)
+    rng = np.random.default_rng(0)
+    records = []
+    for name, drive in ((f"sine_{f:g}hz", growing_sine(f, period, (0.4, 0.7, 1.0))) for f in frequencies):
+        record = Record(drive, np.zeros(drive.size), period, phase=name, initial_voltage=0.0)
+        noise = 2e-8 * rng.normal(size=drive.size)
+        records.append(replace(record, displacement=truth.free_run([record])[0] + noise))
+    found = diagnose(Experiment(tuple(records)), truth)
+    assert found.selection.score.excess == pytest.approx(1.0, abs=0.1)
+    assert found.verdict is Verdict.NOTHING_MISSING or len(frequencies) < 4
+    assert found.gap.after <= found.gap.before

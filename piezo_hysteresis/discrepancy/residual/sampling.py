@@ -119,8 +119,8 @@ def _averaged(record: Record, factor: int) -> Record:
 
 
 def _differs(record: Record, factor: int) -> bool:
-    """Whether block averages do not describe the drive."""
-    u = record.voltage
+    """Whether block averages do not describe the drive, with the jump at its beginning."""
+    u = record.voltage if record.continues else np.append(np.full(factor, record.settled_voltage), record.voltage)
     blocks = u.size // factor
     means = u[: blocks * factor].reshape(blocks, factor).mean(axis=1)
     middles = factor * np.arange(blocks) + (factor - 1) / 2.0
