@@ -70,11 +70,12 @@ def changes(day: Nanopositioner) -> Iterator[tuple[str, str, float | None, Nanop
     yield "loop + 20 %", "hysteresis", None, replace(day, loop=1.2 * day.loop)
     yield "softening 3 %", "dynamics", None, replace(day, softening=0.03)
     yield "drift 1 % in 10 s", "drift", None, replace(day, drift=0.01)
-    yield "drift 5 % in 10 s", "drift", None, replace(day, drift=0.05)
-    for factor in (1.5, 2.0):
+    for drift in (0.05, 0.15):
+        yield f"drift {100 * drift:g} % in 10 s", "drift", None, replace(day, drift=drift)
+    for factor in (1.5, 2.0, 4.0):
         creeps = replace(day, creep_fast=factor * day.creep_fast, creep_slow=factor * day.creep_slow)
         yield f"creep × {factor:g}", "creep", None, creeps
-    for factor in (0.93, 1.06):
+    for factor in (0.8, 0.93, 1.06):
         yield f"resonance × {factor:g}", "dynamics", (factor - 1.0) * day.mode, replace(day, mode=factor * day.mode)
 
 

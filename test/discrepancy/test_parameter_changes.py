@@ -89,6 +89,19 @@ def test_the_changed_parameter_is_named(model, another_day, changed, key, size):
     assert change.interval_95[0] <= size <= change.interval_95[1] or not key.startswith("low_pass")
 
 
+@pytest.mark.parametrize(
+    ("changed", "key"),
+    [
+        ({"drift": 0.4}, "drift"),
+        ({"softening": 0.25}, "softening"),
+        ({"mode": 250.0}, "resonance"),
+        ({"mode": 400.0}, "resonance"),
+    ],
+)
+def test_a_large_change_is_named_although_its_form_is_not_exact(model, another_day, changed, key):
+    assert change_of(model, replace(another_day, **changed)).key == key
+
+
 @pytest.mark.parametrize("late", [5e-4, 1e-3, 4e-3])
 def test_the_lag_of_a_moving_average_is_said(model, another_day, late):
     change = change_of(model, replace(another_day, filter_mean=late))

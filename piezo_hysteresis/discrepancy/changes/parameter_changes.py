@@ -39,13 +39,14 @@ Array = NDArray[np.float64]
 
 EXPLAINS = 0.7
 """Largest share of V that a change may leave, relative to V with fitted gain, loop height and zero."""
-NEARLY_ALL = 0.08
-"""Largest share of V that a lag may leave if V remains above `LEAVES`: samples do not show its form between them."""
+NEARLY_ALL, NEARLY_ALL_OF_A_LAG = 0.01, 0.08
+"""Largest share of V that a change may leave if V remains above `LEAVES`. No form describes a large change exactly, and
+samples do not show the form of a lag between them."""
 SEEN = 0.7
 """Smallest size of a reported change, RMS in floors."""
 RIVAL = 1.15
 """Largest ratio of V for which another change counts as explaining as much."""
-MOVED = (0.9, 0.95, 0.98, 1.02, 1.05, 1.1)
+MOVED = (0.75, 0.8, 0.85, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1, 1.15, 1.2, 1.27, 1.35)
 """Start values of the search for a shifted resonance, relative to its frequency."""
 TURNS = 4
 """Number of linearisations of that search."""
@@ -109,7 +110,8 @@ def find_change(
     if found[0] in sides:  # of gain and loop height, the one that is farther from what differs from day to day
         found.sort(key=lambda e: e is not max(sides, key=lambda s: _in_deviations(s.search, s.account, s.account.key)))
     best, search = found[0].account, found[0].search
-    leaves = best.left < LEAVES or (best.key in SHAPES and best.left < NEARLY_ALL * day.cost)
+    share = NEARLY_ALL_OF_A_LAG if best.key in SHAPES else NEARLY_ALL
+    leaves = best.left < max(LEAVES, share * day.cost)
     if not (leaves and best.cost < EXPLAINS * day.cost and day.cost - best.cost > SEEN**2):
         return None
     jackknife, *beside = search.halves(best).tolist()
