@@ -20,6 +20,7 @@ import base64
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
@@ -44,6 +45,7 @@ def document(
     comparison: ModelComparison,
     verdict: VerdictText,
     parts: Mapping[str, tuple[Sequence[Drawing], Sequence[Table]]],
+    answer: Mapping[str, Any] | None = None,
 ) -> str:
     """The whole page.
 
@@ -57,8 +59,10 @@ def document(
         Verdict, at the top of the page.
     parts : mapping of str to (drawings, tables)
         Contents of every section by its heading.
+    answer : mapping, optional
+        Answer of a diagnosis, as in the JSON file; its errors are shown under its verdict.
     """
-    merit = tuple(_figures_of_merit(comparison))
+    merit = (*_errors(comparison, answer or {}), *_sizes(comparison))
     return framed(title, comparison.experiment.source, chain(comparison.model), verdict, merit, parts, FREE_RUN)
 
 
@@ -112,14 +116,23 @@ def _template() -> Template:
     return environment.get_template("page.html.jinja")
 
 
-def _figures_of_merit(comparison: ModelComparison) -> Iterator[tuple[str, str]]:
-    now, before = comparison.now, comparison.before
-    if now is not None:
+def _errors(comparison: ModelComparison, answer: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    now, before, gap = comparison.now, comparison.before, answer.get("gap_percent_of_range") or {}
+    if gap.get("after") is not None:
+        seen = "test records" if gap.get("unseen", True) else "fitted data"
+        yield f"error before, {seen}", f"{gap['before']:.3g} %"
+        yield f"error after, {seen}", f"{gap['after']:.3g} %"
+        yield "noise floor", f"{gap['floor']:.3g} %"
+    elif now is not None:
         if before is not None:
             yield "error before", f"{before.percent:.3g} %"
         yield "error after" if before is not None else "error", f"{now.percent:.3g} %"
         yield "noise floor", f"{100 * comparison.floor / now.range:.2g} %"
         yield "rms error", nanometre(now.rms)
-        yield "range", nanometre(now.range)
+
+
+def _sizes(comparison: ModelComparison) -> Iterator[tuple[str, str]]:
+    if comparison.now is not None:
+        yield "range", nanometre(comparison.now.range)
     yield "phases", f"{len(comparison.experiment)}"
     yield "samples", f"{comparison.experiment.size:,}".replace(",", " ")

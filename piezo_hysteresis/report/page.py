@@ -133,7 +133,7 @@ def page(
     headings = [h for h in ("Diagnosis", *SECTIONS, "Parameters", "Data") if h in drawn or h in tables]
     parts = {h: (drawn.get(h, []), tables.get(h, [])) for h in headings}
     drawings = tuple(d for group in drawn.values() for d in group)
-    return Page(document(title, comparison, verdict(comparison, answer), parts), drawings)
+    return Page(document(title, comparison, verdict(comparison, answer), parts, answer), drawings)
 
 
 def _tables(comparison: ModelComparison, fit: Fit | None, answer: Mapping[str, Any] | None) -> dict[str, list[Table]]:

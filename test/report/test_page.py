@@ -221,6 +221,22 @@ def test_a_correction_without_a_name_is_drawn_and_tabled_only_where_it_is_accept
     assert "A correction." in answer_verdict(refused).sentences
 
 
+def test_the_numbers_under_the_verdict_are_those_of_the_answer(drawn, answer):
+    gap = answer["gap_percent_of_range"]
+    shown = dict(re.findall(r"<dt>([^<]*)</dt>\s*<dd>([^<]*)</dd>", drawn.html))
+    assert [shown[f"error {when}, test records"] for when in ("before", "after")] == [
+        f"{gap[when]:.3g} %" for when in ("before", "after")
+    ]
+    assert shown["noise floor"] == f"{gap['floor']:.3g} %"
+
+
+def test_an_array_is_shown_in_one_row():
+    weights = {f"c[{k}]": {"value": 0.01 * k, "interval_95": [0.0, 1.0], "unit": "1"} for k in range(12)}
+    effect = {"name": "plays", "family": "f", "explained_fraction": 1.0, "confusable_with": [], "parameters": weights}
+    (row,) = effect_table({"effects": [effect]}).rows
+    assert row[-3:] == ("c [1]", "12 from 0 to 0.11", "")
+
+
 def test_tables_of_a_diagnosis_agree_with_its_answer(answer):
     (effect,) = effect_table(answer).rows
     assert effect[:3] == ("creep", "creep", "97 %")

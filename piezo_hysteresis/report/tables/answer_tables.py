@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import groupby
 from typing import Any
 
 from .table import Table
@@ -26,22 +27,30 @@ _GAP = ("before", "after", "floor")
 
 
 def effect_table(answer: Mapping[str, Any]) -> Table | None:
-    """Every effect found, parameter by parameter, with 95 % intervals."""
+    """Every effect found, parameter by parameter, with 95 % intervals; those of an array are in the JSON answer."""
     rows = []
     for effect in answer.get("effects", ()):
         twins = ", ".join(effect["confusable_with"]) or "none"
         share = f"{100 * effect['explained_fraction']:.0f} %"
-        for name, value in effect["parameters"].items():
-            interval = value.get("interval_95")
-            message = f"{interval[0]:.4g} … {interval[1]:.4g}" if interval else ""
-            parameter = f"{name} [{value['unit']}]"
-            rows.append((effect["name"], effect["family"], share, twins, parameter, f"{value['value']:.4g}", message))
+        rows += [(effect["name"], effect["family"], share, twins, *cells) for cells in _cells(effect["parameters"])]
     header = ("effect", "family", "share of the gap", "confusable with", "parameter", "value", "95 %")
     several = len({row[0] for row in rows}) > 1
     note = "The share is the decrease of the RMS error above the noise floor." + (
         " Each row states the share that this effect and all effects above it explain together." if several else ""
     )
     return Table("Effects found", header, tuple(rows), note, frozenset({2, 5, 6})) if rows else None
+
+
+def _cells(parameters: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Name, value and 95 % interval of every parameter; an array in one row, with its range."""
+    for array, names in groupby(parameters, key=lambda name: name.partition("[")[0]):
+        rows = [parameters[name] for name in names]
+        name, values = f"{array} [{rows[0]['unit']}]", [row["value"] for row in rows]
+        if array not in parameters:
+            yield name, f"{len(values)} from {min(values):.4g} to {max(values):.4g}", ""
+            continue
+        (interval,) = (row.get("interval_95") for row in rows)
+        yield name, f"{values[0]:.4g}", f"{interval[0]:.4g} … {interval[1]:.4g}" if interval else ""
 
 
 def correction_table(answer: Mapping[str, Any]) -> Table | None:
