@@ -105,7 +105,8 @@ def concluded(
         conclusion, reason = Conclusion.INSUFFICIENT_DATA, DIVERGES
     else:
         conclusion, reason = conclusion_of(selection, falls, falls or not named, gap)
-    delivered, fit = final.stated_model, final
+    delivered = final.stated_model
+    fit: Fit | None = final
     if given is not None:
         chosen = tuple(p.index for p in gap.per_phase)
         zeros = replace(zero, offset=True), replace(free, offset=True)
