@@ -19,13 +19,18 @@ sample, a hold, growing sines at three frequencies, 0.02 % noise. Every rate is 
 amplitudes, then all rates but one. The last row has the slowest rate alone and no step. A lag then looks like creep, so
 that no error is promised at the fastest rate but the one that the stated uncertainty of the lag allows.
 
+With `--voltage-noise`, the voltage of the records that are fitted was measured with white noise; the stage has not seen
+it, and the records that judge have none.
+
     python -m benchmarks.rates --stages 6
+    python -m benchmarks.rates --stages 6 --voltage-noise 0.01
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -64,6 +69,12 @@ def played(stage: Nanopositioner, frequencies: tuple[float, ...], levels: tuple[
     return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives))
 
 
+def measured(experiment: Experiment, noise: float, rng: np.random.Generator) -> Experiment:
+    """The experiment with noise of that standard deviation [V] in its voltage."""
+    records = [replace(r, voltage=r.voltage + noise * rng.standard_normal(r.size)) for r in experiment]
+    return replace(experiment, records=tuple(records))
+
+
 def without_step(stage: Nanopositioner, frequency: float) -> Experiment:
     """A record of growing sines that begin at rest."""
     swing = 0.5 * (1.0 - np.cos(2.0 * np.pi * frequency * PERIOD * np.arange(round(2.0 / frequency / PERIOD))))
@@ -95,6 +106,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Number of stages."""
     parser.add_argument("--stages", type=int, default=6)
     parser.add_argument("--first", type=int, default=0, help="seed of the first stage")
+    parser.add_argument("--voltage-noise", type=float, default=0.0, help="of the fitted records [V]")
 
 
 def run(options: argparse.Namespace) -> list[Figures]:
@@ -105,11 +117,13 @@ def run(options: argparse.Namespace) -> list[Figures]:
         rng = np.random.default_rng(seed)
         stage = Nanopositioner.random(rng, mode=float(rng.uniform(250.0, 800.0)))
         for what, fitted, levels, judged in cases():
-            identified = identify(played(stage, fitted, levels), memory=True)
+            recorded = measured(played(stage, fitted, levels), options.voltage_noise, rng)
+            identified = identify(recorded, memory=True)
             rows = errors(identified.model, played(stage, judged), zero_per_phase(identified.model)).rows
             holds = lag_holds(identified, stage)
             found.setdefault(what, []).append((max(r.percent for r in rows), holds))
-        slowest = identify(without_step(stage, FREQUENCIES[0]), memory=True)
+        recorded = measured(without_step(stage, FREQUENCIES[0]), options.voltage_noise, rng)
+        slowest = identify(recorded, memory=True)
         (row,) = errors(slowest.model, without_step(stage, FREQUENCIES[-1]), zero_per_phase(slowest.model)).rows
         uncertainty = float(slowest.model.provenance[LAG_ERROR])
         one_rate.append((row.percent, 100.0 * error_of_lag(uncertainty, FREQUENCIES[-1]), lag_holds(slowest, stage)))

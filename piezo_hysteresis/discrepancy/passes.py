@@ -20,15 +20,15 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ..errors import IdentificationError
-from ..identification.records.conditioning_split import known_from_within
+from ..identification.records.comparable import comparable
 from ..identification.records.roles import roles_of
 from ..record import Notice
 from .changes.same_stage import same_stage
 from .diagnosis import Conclusion, Diagnosis
-from .diagnosis_state import VOLTAGE_NOISE, DiagnosisState
+from .diagnosis_state import DiagnosisState
 from .excitation_check import check_motion, moves
 from .many_records import diagnose_many
-from .residual.sampling import NOISE_WIDTH, is_faster, quieted, resampled, voltage_noise
+from .residual.sampling import is_faster, resampled
 from .single_record import diagnose_few
 from .unnamed.correction import without_corrections
 from .verdict import FEWEST_RECORDS
@@ -40,23 +40,9 @@ Pass = Callable[[DiagnosisState], DiagnosisState | Diagnosis]
 """Takes the state of the diagnosis; returns the new state, or the answer, which ends the diagnosis."""
 
 
-def quiet_voltage(state: DiagnosisState) -> DiagnosisState:
-    """Remove changes of the voltage that are not larger than its measured noise."""
-    experiment = state.experiment
-    noise = voltage_noise(experiment.records)
-    if not noise.any():
-        return state
-    message = (
-        f"the voltage was measured with {noise.max():.2g} V of noise; voltage changes smaller than "
-        f"{NOISE_WIDTH:g} times that were treated as noise"
-    )
-    records = tuple(quieted(r, n) for r, n in zip(experiment.records, noise.tolist(), strict=True))
-    return replace(state, experiment=replace(experiment, records=records).noting(Notice(VOLTAGE_NOISE, message)))
-
-
-def start_at_a_known_state(state: DiagnosisState) -> DiagnosisState:
-    """Cut records that begin in an unknown state at the point where a full loop determines it, as `identify` does."""
-    experiment, notices = known_from_within(state.experiment)
+def prepare(state: DiagnosisState) -> DiagnosisState:
+    """Remove the noise of a measured voltage, and cut records that begin in an unknown state, as `identify` does."""
+    experiment, notices = comparable(state.experiment)
     return replace(state, experiment=experiment.noting(*notices)) if notices else state
 
 
@@ -120,8 +106,7 @@ def answer(state: DiagnosisState) -> Diagnosis:
 
 
 PASSES: tuple[Pass, ...] = (
-    quiet_voltage,
-    start_at_a_known_state,
+    prepare,
     check_data,
     resample_for_the_given_model,
     compare_with_given_model,

@@ -27,7 +27,7 @@ from ..effects import HYSTERESIS, OPERATORS
 from ..errors import ParameterError
 from ..identification.identified_range import outside
 from ..identification.identify import identify
-from ..identification.records.conditioning_split import known_from_within
+from ..identification.records.comparable import comparable
 from ..model import model_file
 from ..record import Experiment
 from ..report.words import POOR, USELESS
@@ -97,7 +97,7 @@ class Validate:
 
     def __call__(self, experiment: Experiment) -> WorkResult:
         model = model_file.loads(self.model)
-        known, conditioned = known_from_within(experiment)
+        known, conditioned = comparable(experiment)
         found = errors(model, known, zero_per_phase(model))
         records = known.records
         floor = floors(records, noise_floors(records))

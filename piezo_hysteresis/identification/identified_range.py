@@ -26,6 +26,7 @@ from ..model.model import Model
 from ..parameter import slew_text
 from ..record import Experiment, Notice, Record
 from .records.excitation_content import MOVES, excitation_content, moving
+from .records.noise import quieted, voltage_noise
 from .steps.remaining_lag import error_of_lag
 
 LOWEST, HIGHEST = "voltage_min", "voltage_max"
@@ -96,6 +97,7 @@ def _outside_of(model: Model, record: Record) -> Iterator[Notice]:
         return
     low, high, slowest, fastest, steepest = (float(model.provenance[key]) for key in KEYS)
     room = BEYOND * (high - low)
+    record = quieted(record, float(voltage_noise((record,))[0]))
     least, most = float(record.voltage.min()), float(record.voltage.max())
     content = excitation_content(record)
     if least < low - room or most > high + room:

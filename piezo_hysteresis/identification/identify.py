@@ -42,8 +42,8 @@ from .one_core import on_one_core
 from .published_steps import delay_of_steps, published_steps
 from .records.conditioning import records_to_fit
 from .records.conditioning_split import known_from_within
-from .records.excitation_content import sensor_noise
 from .records.leading_step import Blocks, steps_apart
+from .records.noise import sensor_noise, without_voltage_noise
 from .records.roles import HELD_OUT, roles_of
 from .steps.comparison import InputComparison, compare_inputs
 from .steps.dynamics import Dynamics, delay_of
@@ -121,9 +121,10 @@ def identify(
     """
     report = progress or (lambda word, fraction: None)
     check_gauge(voltage_scale, displacement_scale, gain, hysteresis)
-    experiment, conditioning_notices = known_from_within(experiment_of(experiment))
+    recorded, conditioning_notices = known_from_within(experiment_of(experiment))
+    roles = roles_of(recorded, held_out)
+    experiment, noise_notices = without_voltage_noise(recorded)
     records = experiment.records
-    roles = roles_of(experiment, held_out)
     if not any(roles.contents[i].span > 0.0 for i in roles.fitted):
         raise IdentificationError("identify: the drive does not move in any record; expected loops, steps or noise")
     longest = max(records[i].size for i in roles.fitted if roles.contents[i].span > 0.0)
@@ -138,7 +139,7 @@ def identify(
     scale_y = reach if displacement_scale is None else displacement_scale
     floors = [max(c.noise, ADEQUACY * reach) for c in roles.contents]
     period = experiment.fastest_period
-    notices: list[Notice] = [*experiment.notices, *conditioning_notices]
+    notices: list[Notice] = [*experiment.notices, *conditioning_notices, *noise_notices]
 
     report("step 1: delay", 0.0)
     delay = delay_of_steps(experiment, roles, notices)

@@ -20,6 +20,7 @@ import argparse
 
 from ...discrepancy.changes.moved_group import EXCESS, FULL
 from ...discrepancy.changes.recalibration import Recalibration, recalibrate
+from ...identification.records.noise import without_voltage_noise
 from ...model import model_file
 from ...report.json_file import write_json
 from ...report.words import describes, error_sentence
@@ -48,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     """
     require_new_results(args)
     model = model_file.load(args.model)
-    experiment = reading_options.read(args)
+    experiment, noise = without_voltage_noise(reading_options.read(args))
     found = recalibrate(model, experiment)
     path = model_file.save(found.model, args.output)
     if args.json is not None:
@@ -63,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     out.print(f"lag          {1e6 * found.lag:+.4g} µs")
     out.print(f"offset       {1e9 * found.offset:.4g} nm")
     out.print(f"The free-run error was {found.before:.3g} % of the range before and is {found.after:.3g} % after.")
-    show_notices(experiment.notices)
+    show_notices((*experiment.notices, *noise))
     out.print(f"wrote {path}")
     severe = sum(notice.severe for notice in experiment.notices)
     caveat = f" Severe findings in the data make this doubtful: {severe}, see above." if severe else ""

@@ -24,7 +24,7 @@ from ...discrepancy.residual.correlation import CAPTION, correlate
 from ...discrepancy.residual.residual import Errors, zero_per_phase
 from ...errors import RecordError
 from ...identification.identified_range import outside
-from ...identification.records.conditioning_split import known_from_within
+from ...identification.records.comparable import comparable
 from ...model import model_file
 from ...record import CONDITIONING, Experiment
 from ...report.figures.comparison import ModelComparison, compare
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     if Path(args.model).suffix == ".npz":
         return several_axes.validate(reading_options.read(args), args)
     model = model_file.load(args.model)
-    experiment, conditioned = known_from_within(reading_options.read(args))
+    experiment, conditioned = comparable(reading_options.read(args))
     nuisances = None if args.one_zero else {"error": zero_per_phase(model)}
     comparison = compare(experiment, {"error": model}, nuisances)
     now = comparison.errors["error"]

@@ -22,6 +22,7 @@ from typing import Any
 
 from ...discrepancy.residual.residual import zero_per_phase
 from ...errors import ParameterError, RecordingError
+from ...identification.records.comparable import comparable
 from ...model import model_file
 from ...report.figures.comparison import compare
 from ...report.json_file import read_json
@@ -74,6 +75,9 @@ def run(args: argparse.Namespace) -> int:
         models[label] = model_file.load(path)
     answer = None if args.answer is None else _answer(args.answer)
     experiment = reading_options.read(args)
+    if models:
+        prepared, notices = comparable(experiment)
+        experiment = prepared.noting(*notices)
     nuisances = None if args.one_zero else {label: zero_per_phase(model) for label, model in models.items()}
     with progress("report") as report_progress:
         drawn = page(compare(experiment, models, nuisances), answer=answer, title=args.title, progress=report_progress)

@@ -33,6 +33,7 @@ from ...effects import Offset
 from ...errors import IdentificationError, ParameterError
 from ...identification.fit.normal_equations import Nuisance, residuals
 from ...identification.records.conditioning_split import conditioning_length, covers
+from ...identification.records.noise import without_voltage_noise
 from ...model.model import Model
 from ...model.provenance import LARGEST, largest_error, provenance
 from ...record import CONDITIONING, Experiment, Record
@@ -108,7 +109,7 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     ModelError
         If the records are faster than the model.
     """
-    records = _after_a_loop(experiment.records)
+    records = _after_a_loop(without_voltage_noise(experiment)[0].records)
     used = [i for i, r in enumerate(records) if moves(r) and r.phase != CONDITIONING]
     used = [i for i in used if not records[i].truncated] or used
     check_motion("recalibrate", [records[i] for i in used])

@@ -24,7 +24,7 @@ import numpy as np
 from ...effects import ExtraResonance, Softening, ThermalDrift
 from ...errors import DivergenceError, ModelError, ParameterError
 from ...identification.fit.normal_equations import Nuisance
-from ...identification.records.conditioning_split import known_from_within
+from ...identification.records.comparable import comparable
 from ...model.model import Model
 from ...model.provenance import data_hash
 from ...record import Experiment, Notice, Record
@@ -75,7 +75,7 @@ def same_stage(
     """
     records = experiment.records
     recorded = experiment if given is None else given
-    hashes = {data_hash(e) for e in (experiment, recorded, known_from_within(recorded)[0])}
+    hashes = {data_hash(e) for e in (experiment, recorded, comparable(recorded)[0])}
     if model.provenance.get(HASH) in hashes or not used:
         return None
     least = floors(records, noise_floors(records))

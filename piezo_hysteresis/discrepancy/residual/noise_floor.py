@@ -29,7 +29,7 @@ import scipy
 from ...blocks.block import Array
 from ...channel_mapping import quantity_of
 from ...identification.fit.form_uncertainty import ADEQUACY
-from ...identification.records.excitation_content import noise_on_motion
+from ...identification.records.noise import noise_on_motion
 from ...record import Experiment, Record
 
 MAINS = (50.0, 60.0)

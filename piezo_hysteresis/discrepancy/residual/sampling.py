@@ -28,16 +28,9 @@ import numpy as np
 import scipy
 
 from ...blocks.block import Array
-from ...effects.drive.backlash import run_play
-from ...identification.records.excitation_content import excitation_content, noise_on_motion
+from ...identification.records.excitation_content import excitation_content
 from ...record import Record
 
-FEWEST_BENDS = 50
-"""Smallest number of second differences of a voltage for an estimate of its noise."""
-WHITE = 0.65
-"""Share of sign changes between second differences: 0.73 in white noise, 0.5 by chance, 0 in smooth curves."""
-NOISE_WIDTH = 3.0
-"""Largest change of a voltage that counts as noise, in standard deviations of its noise."""
 ENOUGH = 10_000
 """Number of samples above which a record is averaged."""
 SLOWEST = 2e-3
@@ -54,38 +47,6 @@ MOST = 200_000
 """Largest number of samples of an interpolated record."""
 ALIKE = 0.1
 """Largest relative difference, in size and in speed, between the drive of a part and the whole drive."""
-
-
-def voltage_noise(records: Sequence[Record]) -> Array:
-    """Standard deviation of the voltage noise of every record [V]; 0 if the voltage is a command and not measured.
-
-    The second differences of noise change sign from one to the next; those of commanded ramps, holds and rests are
-    zero. Longer block averages contain less noise.
-    """
-    least, density, is_white = np.inf, np.inf, False
-    for record in records:
-        bends = np.diff(record.voltage, 2)
-        if bends.size < FEWEST_BENDS:
-            continue
-        size = noise_on_motion(record.voltage, 2)
-        density = min(density, size * np.sqrt(record.sample_period))
-        if size < least:
-            least = size
-            is_white = bool(np.mean(bends[1:] * bends[:-1] < 0.0) > WHITE)
-    if not is_white:
-        return np.zeros(len(records))
-    return np.maximum(least, density / np.sqrt([r.sample_period for r in records]))
-
-
-def quieted(record: Record, noise: float) -> Record:
-    """The record without voltage changes that are smaller than noise of that size [V].
-
-    A hysteresis loop responds to every small turn of the voltage and loses memory. The stage has not seen the measured
-    noise, so the model must not see it.
-    """
-    voltage = np.empty(record.size)
-    run_play(np.array(record.voltage), NOISE_WIDTH * noise, record.voltage[:1].copy(), voltage)
-    return replace(record, voltage=voltage)
 
 
 def less(records: Sequence[Record], changes: Sequence[Array]) -> tuple[Record, ...]:

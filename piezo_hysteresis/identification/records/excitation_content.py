@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...record import Record, Samples
+from .noise import noise_of, noise_on_motion, quieted, voltage_noise
 from .steady_waves import is_row_of_waves
 
 SLOW = 30.0
@@ -36,6 +36,8 @@ MARKED = 0.95
 """Share of the power of dv/dt that defines bandwidth and number of lines."""
 UNMEASURED = 5e-4
 """Share of the range below which the highest frequencies of a drive are noise of the recorder and not excitation."""
+ABOVE = 1.25
+"""The same, in standard deviations of the noise that the drive was measured with."""
 MOVES = 0.02
 """Share of the largest range of the drive from which a record shows frequencies; below it is a rest."""
 RINGS = 0.05
@@ -44,8 +46,6 @@ HELD = 32
 """Smallest number of samples of such a hold."""
 ONE_WAY = 0.9
 """Share of the motion of such a drive that the net changes between its levels are."""
-GAUSSIAN = 1.4826
-"""Standard deviation over median absolute value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,8 @@ class ExcitationContent:
 def excitation_content(record: Record) -> ExcitationContent:
     """Judge a record by the spectrum of its dv/dt and the noise of its displacement."""
     span = float(np.ptp(np.append(record.voltage, record.settled_voltage)))
-    spectrum = _excitation(np.diff(record.voltage), span)
+    noise = float(voltage_noise((record,))[0])
+    spectrum = _excitation(np.diff(record.voltage), max(UNMEASURED * span, ABOVE * noise))
     power = np.abs(spectrum) ** 2
     total = float(power.sum())
     if total == 0.0:
@@ -114,7 +115,7 @@ def excitation_content(record: Record) -> ExcitationContent:
     slowest = max(float(frequency[np.searchsorted(grown, (1.0 - MARKED) * total)]), 0.5 / record.duration)
     lines = int(np.searchsorted(np.cumsum(np.sort(power)[::-1]), MARKED * total)) + 1
     moments = min(_spread(speed), _spread(np.diff(speed)))
-    waves = is_row_of_waves(record.voltage, record.sample_period, bandwidth)
+    waves = is_row_of_waves(quieted(record, noise).voltage, record.sample_period, bandwidth)
     levels = _holds_levels(record.voltage, max(HELD, round(RINGS / record.sample_period)))
     return ExcitationContent(span, bandwidth, slowest, lines, moments, noise_of(record), waves, levels)
 
@@ -125,15 +126,15 @@ def moving(contents: Sequence[ExcitationContent]) -> list[ExcitationContent]:
     return [c for c in contents if c.span >= MOVES * largest > 0.0]
 
 
-def _excitation(speed: Samples, span: float) -> NDArray[np.complex128]:
-    """Spectrum of dv, without the highest frequencies where v does not exceed the noise of its recorder."""
+def _excitation(speed: Samples, unmeasured: float) -> NDArray[np.complex128]:
+    """Spectrum of dv, without the highest frequencies, where v does not exceed `unmeasured` [V]."""
     if not speed.size:
         return np.zeros(1, np.complex128)
     spectrum = np.fft.rfft(speed)
     angle = np.pi * np.arange(spectrum.size) / speed.size
     position = np.abs(spectrum[1:]) ** 2 / np.sin(angle[1:]) ** 2 / (2.0 * speed.size**2)
     beyond = np.cumsum(position[::-1])[::-1]  # power of v from each line on [V²]
-    spectrum[1:][beyond < (UNMEASURED * span) ** 2] = 0.0
+    spectrum[1:][beyond < unmeasured**2] = 0.0
     return spectrum
 
 
@@ -155,56 +156,6 @@ def _spread(values: Samples) -> float:
     squares = values * values
     fourth = float(squares @ squares)
     return float(squares.sum()) ** 2 / fourth if fourth > 0.0 else 0.0
-
-
-def noise_of(record: Record, fewest: int = 64) -> float:
-    """Standard deviation of the sensor noise [m].
-
-    From the longest rest of the record after subtraction of a parabola. Without a rest of `fewest` samples, from third
-    differences, which are near zero for a smooth motion.
-    """
-    y = record.displacement
-    moves = np.flatnonzero(np.concatenate(([True], np.diff(record.voltage) != 0.0, [True])))
-    longest = int(np.argmax(np.diff(moves))) if moves.size > 1 else 0
-    start, stop = (int(moves[longest]), int(moves[longest + 1])) if moves.size > 1 else (0, y.size)
-    # the stage rings after the drive stops, so only the later half is used
-    start += (stop - start) // 2 if start > 0 else 0
-    if stop - start >= fewest:
-        t = np.linspace(-1.0, 1.0, stop - start)
-        rest = y[start:stop] - np.polynomial.Polynomial.fit(t, y[start:stop], 2)(t)
-        return float(np.std(rest))
-    if y.size < 8:
-        return 0.0
-    return noise_on_motion(y, 3)
-
-
-def noise_on_motion(values: Samples, order: int) -> float:
-    """Standard deviation of white noise on a smooth motion, from differences of the given order.
-
-    The differences have the power C(2 order, order), the sum of the squared binomial coefficients.
-
-    Examples
-    --------
-    >>> noise = np.random.default_rng(0).normal(0.0, 0.1, 100_000)
-    >>> round(noise_on_motion(np.sin(np.arange(100_000) / 300.0) + noise, 3), 2)
-    0.1
-    """
-    typical = np.median(np.abs(np.diff(values, order)))
-    return float(GAUSSIAN * typical / np.sqrt(math.comb(2 * order, order)))
-
-
-def sensor_noise(records: Sequence[Record]) -> list[float]:
-    """Standard deviation of the sensor noise of every record [m]: the smallest one of records at its sample period.
-
-    All records have the same sensor, so a larger value in one record is motion, such as ringing after a step.
-    """
-    own = [min(noise_of(r), noise_on_motion(r.displacement, 3)) if r.size >= 8 else noise_of(r) for r in records]
-    least: list[float] = []
-    for record in records:
-        near = 1e-3 * record.sample_period
-        alike = zip(own, records, strict=True)
-        least.append(min(n for n, other in alike if abs(other.sample_period - record.sample_period) < near))
-    return least
 
 
 def excited_part(record: Record, window: int = 64) -> Record:

@@ -14,8 +14,6 @@
 
 """Records are brought to the period and length that the search needs, and keep what their drive shows."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -24,10 +22,8 @@ from hypothesis import strategies as st
 from piezo_hysteresis.discrepancy.residual.sampling import (
     at_period,
     common_period,
-    quieted,
     shortened,
     slowed,
-    voltage_noise,
 )
 from piezo_hysteresis.identification.records.excitation_content import excitation_content
 from piezo_hysteresis.record import Record
@@ -109,34 +105,6 @@ def test_the_dynamics_set_the_period_and_faster_records_are_averaged():
     assert common_period((step, noise)) == 5 * FAST
     assert at_period(step, 5 * FAST).sample_period == 5 * FAST
     assert at_period(step, 5 * FAST).size == 400
-
-
-@pytest.mark.parametrize("noise", [1e-4, 1e-3])
-def test_a_measured_voltage_has_noise_and_a_commanded_one_has_none(noise):
-    random = np.random.default_rng(0)
-    t = 1e-3 * np.arange(4000)
-    drives = (np.zeros(t.size), 8.0 * np.abs(t % 1.0 - 0.5), np.repeat([0.0, 3.0, 6.0, 2.0], 1000), np.sin(300.0 * t))
-    commanded = [Record(u, 1e-6 * u, 1e-3) for u in drives]
-    measured = [replace(r, voltage=r.voltage + noise * random.standard_normal(r.size)) for r in commanded]
-    assert not voltage_noise(commanded).any()
-    assert not voltage_noise(commanded[3:]).any()
-    assert voltage_noise(measured) == pytest.approx(noise, rel=0.1)
-    averaged = [measured[0], measured[1].decimate(16)]
-    assert voltage_noise(averaged) == pytest.approx([noise, noise / 4.0], rel=0.2)
-
-
-def test_the_noise_of_a_drive_is_removed_and_its_motion_kept():
-    noise, t = 1e-3, 1e-4 * np.arange(40_000)
-    drive = 8.0 * np.abs(t % 1.0 - 0.5)
-    noisy = drive + noise * np.random.default_rng(1).standard_normal(t.size)
-    quiet = quieted(Record(noisy, 1e-6 * drive, 1e-4), noise).voltage
-
-    def way(u):
-        return np.abs(np.diff(u)).sum()
-
-    assert np.abs(quiet - drive).max() < 8.0 * noise
-    assert way(noisy) > 1.05 * way(drive)
-    assert way(quiet) == pytest.approx(way(drive), rel=0.01)
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4])

@@ -1,0 +1,161 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Noise of sensor and voltage, estimated from the samples, and a drive without its noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import savgol_coeffs, savgol_filter
+
+from ...effects.drive.backlash import run_play
+from ...record import Experiment, Notice, Record, Samples
+
+GAUSSIAN = 1.4826
+"""Standard deviation over median absolute value."""
+BENDS = (2, 4, 6)
+"""Orders of the differences of a voltage that show its noise; high ones are small in waves, low ones at turns."""
+FEWEST_BENDS = 50
+"""Smallest number of such differences."""
+WHITE = 0.75
+"""Share of sign changes between the highest differences: 0.83 in white noise, 0.5 by chance, 0 in smooth curves."""
+SMALLEST, LARGEST = 1e-6, 5e-3
+"""Noise of a measured voltage, as a share of its range: less is not noticed, and more is a drive that is random."""
+WINDOWS = (5, 7, 9, 11, 13, 17, 25, 33, 49, 65, 97, 129, 193, 257)
+"""Numbers of samples over which a noisy voltage may be smoothed."""
+WIDTH = 0.5
+"""Half width of the plays that take away its turns, in standard deviations of the noise."""
+AGREE = 1.5
+"""Standard deviations within which the smooth voltages of two windows agree."""
+VOLTAGE_NOISE = "voltage_noise"
+"""Kind of the notice about a voltage that was measured with noise."""
+
+
+def noise_of(record: Record, fewest: int = 64) -> float:
+    """Standard deviation of the sensor noise [m].
+
+    From the longest rest of the record after subtraction of a parabola. Without a rest of `fewest` samples, from third
+    differences, which are near zero for a smooth motion.
+    """
+    y = record.displacement
+    moves = np.flatnonzero(np.concatenate(([True], np.diff(record.voltage) != 0.0, [True])))
+    longest = int(np.argmax(np.diff(moves))) if moves.size > 1 else 0
+    start, stop = (int(moves[longest]), int(moves[longest + 1])) if moves.size > 1 else (0, y.size)
+    # the stage rings after the drive stops, so only the later half is used
+    start += (stop - start) // 2 if start > 0 else 0
+    if stop - start >= fewest:
+        t = np.linspace(-1.0, 1.0, stop - start)
+        rest = y[start:stop] - np.polynomial.Polynomial.fit(t, y[start:stop], 2)(t)
+        return float(np.std(rest))
+    if y.size < 8:
+        return 0.0
+    return noise_on_motion(y, 3)
+
+
+def noise_on_motion(values: Samples, order: int) -> float:
+    """Standard deviation of white noise on a smooth motion, from differences of the given order.
+
+    The differences have the power C(2 order, order), the sum of the squared binomial coefficients.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).normal(0.0, 0.1, 100_000)
+    >>> round(noise_on_motion(np.sin(np.arange(100_000) / 300.0) + noise, 3), 2)
+    0.1
+    """
+    typical = np.median(np.abs(np.diff(values, order)))
+    return float(GAUSSIAN * typical / np.sqrt(math.comb(2 * order, order)))
+
+
+def sensor_noise(records: Sequence[Record]) -> list[float]:
+    """Standard deviation of the sensor noise of every record [m]: the smallest one of records at its sample period.
+
+    All records have the same sensor, so a larger value in one record is motion, such as ringing after a step.
+    """
+    own = [min(noise_of(r), noise_on_motion(r.displacement, 3)) if r.size >= 8 else noise_of(r) for r in records]
+    least: list[float] = []
+    for record in records:
+        near = 1e-3 * record.sample_period
+        alike = zip(own, records, strict=True)
+        least.append(min(n for n, other in alike if abs(other.sample_period - record.sample_period) < near))
+    return least
+
+
+def voltage_noise(records: Sequence[Record]) -> Samples:
+    """Standard deviation of the voltage noise of every record [V]; 0 if the voltage is a command and not measured.
+
+    High differences of noise change sign from one to the next; those of commanded ramps, holds and rests are zero.
+    Longer block averages contain less noise.
+    """
+    long = [r for r in records if r.size >= FEWEST_BENDS + max(BENDS)]
+    sizes = [min(noise_on_motion(r.voltage, order) for order in BENDS) for r in long]
+    span = max((float(np.ptp(np.append(r.voltage, r.settled_voltage))) for r in records), default=0.0)
+    least = min(sizes, default=0.0)
+    if not SMALLEST * span < least <= LARGEST * span or not _is_white(long[sizes.index(least)].voltage):
+        return np.zeros(len(records))
+    density = min(s * r.sample_period**0.5 for s, r in zip(sizes, long, strict=True))
+    return np.maximum(least, density / np.sqrt([r.sample_period for r in records]))
+
+
+def _is_white(voltage: Samples) -> bool:
+    bends = np.diff(voltage, max(BENDS))
+    return bool(np.mean(bends[1:] * bends[:-1] < 0.0) > WHITE)
+
+
+def quieted(record: Record, noise: float) -> Record:
+    """The record with a smooth voltage, without the changes that noise of that size [V] makes.
+
+    A hysteresis loop responds to every small turn of the voltage and loses memory, and a mode rings with it. The stage
+    has not seen the measured noise, so the model must not see it. What is left of the noise would still turn the
+    drive. A play takes these turns away: the mean of one that runs forward and one that runs backward does not lag.
+    """
+    if noise == 0.0:
+        return record
+    smooth = _smooth(np.array(record.voltage), noise)
+    forward, backward = np.empty(smooth.size), np.empty(smooth.size)
+    for drive, followed in ((smooth, forward), (smooth[::-1].copy(), backward)):
+        run_play(drive, WIDTH * noise, drive[:1].copy(), followed)
+    return replace(record, voltage=0.5 * (forward + backward[::-1]))
+
+
+def _smooth(values: Samples, noise: float) -> Samples:
+    """Cubics through a window around every sample, as long as those through all shorter windows agree with them.
+
+    Two estimates agree if they differ by less than `AGREE` times the sum of their standard deviations, so that steps,
+    sharp turns and fast waves stay (Goldenshluger & Nemirovski, Math. Methods Statist. 6 (1997) 135).
+    """
+    found, low, high = values, values - AGREE * noise, values + AGREE * noise
+    for window in WINDOWS:
+        if window > values.size:
+            break
+        fit = savgol_filter(values, window, 3)
+        error = AGREE * noise * float(np.linalg.norm(savgol_coeffs(window, 3)))
+        low, high = np.maximum(low, fit - error), np.minimum(high, fit + error)
+        found = np.where(low <= high, fit, found)
+    return found
+
+
+def without_voltage_noise(experiment: Experiment) -> tuple[Experiment, tuple[Notice, ...]]:
+    """The experiment without the noise that its voltage was measured with, and a notice if there is any."""
+    noise = voltage_noise(experiment.records)
+    if not noise.any():
+        return experiment, ()
+    records = tuple(quieted(r, n) for r, n in zip(experiment.records, noise.tolist(), strict=True))
+    said = f"the voltage was measured with {noise.max():.2g} V of noise"
+    message = f"{said}, which was removed, because the stage has not seen it"
+    return replace(experiment, records=records), (Notice(VOLTAGE_NOISE, message),)
