@@ -20,7 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from piezo_hysteresis.effects import Arx, BoucWen, HysteresisMemory, LevelDependentMemory
+from piezo_hysteresis.effects import AmplifierBandwidth, Arx, BoucWen, HysteresisMemory, LevelDependentMemory
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
@@ -66,3 +66,23 @@ def test_a_constant_density_is_the_play_itself():
     model, record = Model(effects, PERIOD, 1.0, 1.0), Record(voltage, np.zeros(500), PERIOD, initial_voltage=0.0)
     level = model.with_effect(LevelDependentMemory(middle=0.4))
     np.testing.assert_allclose(level.simulate(record)[0], model.simulate(record)[0], atol=1e-14)
+
+
+def test_slopes_equal_finite_differences_also_by_numbers_of_the_amplifier_before():
+    rng = np.random.default_rng(2)
+    voltage = np.sin(np.arange(3000) / 150.0) * np.linspace(0.1, 1.0, 3000) + 1e-3 * rng.normal(size=3000)
+    effects = (
+        AmplifierBandwidth(tau=4.0 * PERIOD),
+        BoucWen(A=0.0),
+        HysteresisMemory(c=(0.1, 0.05, 0.2), reach=0.6, virgin=1.0),
+        LevelDependentMemory(slope_narrow=0.3, slope_wide=-0.4, curvature=0.2, middle=0.1),
+        Arx(b=(1.0,), delay=2.0),
+    )
+    model, record = Model(effects, PERIOD, 1.0, 1.0), Record(voltage, np.zeros(3000), PERIOD, initial_voltage=0.0)
+    names = [n for n in model.values() if n.partition(".")[0] not in ("arx", "bouc_wen") and not model.row(n).fixed]
+    _, slopes = model.sensitivities(record, names)
+    for name in names:
+        step = 1e-6 * (PERIOD if name.endswith("tau") else 1.0)
+        up, down = (model.with_values({name: model.values()[name] + s}).simulate(record)[0] for s in (step, -step))
+        expected = (up - down) / (2.0 * step)
+        np.testing.assert_allclose(slopes[name], expected, atol=1e-6 * np.abs(expected).max(), err_msg=name)

@@ -31,6 +31,7 @@ from ..excitation_need import ExcitationNeed
 from ..extent import Extent
 from ..invertibility import Invertibility
 from .level_dependent_memory import LevelDependentMemory, LevelDependentMemoryBlock, PlaysBlock, plays_in_c
+from .play import play_positions, play_slopes
 
 SPAN = 32.0
 """Ratio of the largest to the smallest half width."""
@@ -133,25 +134,18 @@ def run_plays(v, c, radii, plays, y):
 @kernel
 def linearise_plays(v, dv, c, radii, plays, dplays, y, dy, own):
     """`run_plays` and derivatives dy (m, n) from dv (m, n); own (s, n) = p_j; plays (s,), dplays (m, s) are updated."""
-    for i in range(v.size):
-        total = 0.0
-        for j in range(radii.size):
-            held, low, high = plays[j], v[i] - radii[j], v[i] + radii[j]
-            plays[j] = max(low, min(high, held))
-            if held <= low:
-                for r in range(dv.shape[0]):
-                    dplays[r, j] = dv[r, i] if held < low else max(dplays[r, j], dv[r, i])
-            elif held >= high:
-                for r in range(dv.shape[0]):
-                    dplays[r, j] = dv[r, i] if held > high else min(dplays[r, j], dv[r, i])
-            own[j, i] = plays[j]
-            total += c[j] * plays[j]
-        y[i] = total
+    dp = np.empty(v.size)
+    y[:] = 0.0
+    dy[:] = 0.0
+    for j in range(radii.size):
+        p, before = own[j], plays[j]
+        plays[j] = play_positions(v, radii[j], before, p)
+        for i in range(v.size):
+            y[i] += c[j] * p[i]
         for r in range(dv.shape[0]):
-            slope = 0.0
-            for j in range(radii.size):
-                slope += c[j] * dplays[r, j]
-            dy[r, i] = slope
+            dplays[r, j] = play_slopes(v, dv[r], radii[j], before, p, dplays[r, j], dp)
+            for i in range(v.size):
+                dy[r, i] += c[j] * dp[i]
 
 
 class HysteresisMemoryBlock(PlaysBlock):

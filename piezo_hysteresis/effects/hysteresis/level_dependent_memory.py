@@ -29,6 +29,7 @@ from ..effect import ChainPosition, Effect, Term
 from ..extent import Extent
 from ..invertibility import Invertibility
 from .level_density import VALUE_IN_C, level_density, level_slopes, level_value
+from .play import play_positions, play_slopes
 
 
 def _relative(name: str, symbol: str, meaning: str, power: int) -> Parameter:
@@ -78,45 +79,40 @@ class LevelDependentMemory(Term):
 @kernel
 def run_level_plays(v, c, a, b, q, radii, plays, y):
     """Output y (n,) = Σ c_j f_j(p_j); plays (s,) is updated."""
+    parts = np.empty(radii.size)
     for i in range(v.size):
-        total = 0.0
+        for j in range(radii.size):  # without the sum, several plays are computed at a time
+            plays[j] = max(v[i] - radii[j], min(v[i] + radii[j], plays[j]))
+            parts[j] = c[j] * level_value(plays[j], a[j], b[j], q)
+        y[i] = 0.0
         for j in range(radii.size):
-            p = max(v[i] - radii[j], min(v[i] + radii[j], plays[j]))
-            plays[j] = p
-            total += c[j] * level_value(p, a[j], b[j], q)
-        y[i] = total
+            y[i] += parts[j]
 
 
 @kernel
 def linearise_level_plays(v, dv, c, a, b, q, m, radii, plays, dplays, y, dy, own):
     """`run_level_plays` and derivatives: dv (m, n) to dy (m, n); own (s + 3, n) by c_j, k_1, k_n and q."""
-    s = radii.size
-    for i in range(v.size):
-        total = 0.0
-        own[s:, i] = 0.0
+    s, p, dp = radii.size, np.empty(v.size), np.empty(v.size)
+    y[:] = 0.0
+    dy[:] = 0.0
+    own[s:] = 0.0
+    by_narrow, by_wide, by_curvature = own[s], own[s + 1], own[s + 2]
+    for j in range(s):  # play after play, because these loops without memory are computed several samples at a time
+        before = plays[j]
+        plays[j] = play_positions(v, radii[j], before, p)
         for r in range(dv.shape[0]):
-            dy[r, i] = 0.0
-        for j in range(s):
-            held, low, high = plays[j], v[i] - radii[j], v[i] + radii[j]
-            p = max(low, min(high, held))
-            plays[j] = p
-            if held <= low:
-                for r in range(dv.shape[0]):
-                    dplays[r, j] = dv[r, i] if held < low else max(dplays[r, j], dv[r, i])
-            elif held >= high:
-                for r in range(dv.shape[0]):
-                    dplays[r, j] = dv[r, i] if held > high else min(dplays[r, j], dv[r, i])
-            own[j, i] = level_value(p, a[j], b[j], q)
-            total += c[j] * own[j, i]
-            by_k, by_q = level_slopes(p, a[j], b[j], q, m)
-            wide = j / (s - 1.0)
-            own[s, i] += (1.0 - wide) * c[j] * by_k
-            own[s + 1, i] += wide * c[j] * by_k
-            own[s + 2, i] += c[j] * by_q
-            density = c[j] * level_density(p, a[j], b[j], q)
-            for r in range(dv.shape[0]):
-                dy[r, i] += density * dplays[r, j]
-        y[i] = total
+            dplays[r, j] = play_slopes(v, dv[r], radii[j], before, p, dplays[r, j], dp)
+            for i in range(v.size):
+                dy[r, i] += c[j] * level_density(p[i], a[j], b[j], q) * dp[i]
+        value, wide = own[j], j / (s - 1.0)
+        for i in range(v.size):
+            value[i] = level_value(p[i], a[j], b[j], q)
+            y[i] += c[j] * value[i]
+        for i in range(v.size):
+            by_k, by_q = level_slopes(p[i], a[j], b[j], q, m)
+            by_narrow[i] += (1.0 - wide) * c[j] * by_k
+            by_wide[i] += wide * c[j] * by_k
+            by_curvature[i] += c[j] * by_q
 
 
 REST = """\
