@@ -234,6 +234,9 @@ class Chain:
         channels: Channels | None = None,
     ) -> tuple[Array, tuple[str, ...], Array, ChainState, ChainTangent]:
         """`run`, and in the same pass the names of the parameters `wanted`, in chain order, and their ∂y/∂θ (q, n)."""
+        if not wanted:
+            y, state = self.run(u, state, channels)
+            return y, (), np.empty((0, u.size)), state, tangent
         states, tangents, inputs, dinputs = [], [], [], []
         x, dx, rows = u, np.empty((0, u.size)), []
         for block, s, t in zip(self.blocks, state.blocks, tangent.blocks, strict=True):

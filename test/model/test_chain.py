@@ -128,6 +128,15 @@ def test_only_wanted_rows_are_carried() -> None:
         np.testing.assert_allclose(some[name], every[name], rtol=1e-12, err_msg=name)
 
 
+def test_without_wanted_rows_the_free_run_alone_is_computed() -> None:
+    records = [*joined(), record(300, initial_voltage=4.0)]
+    parts = list(EVERYTHING.linearise(records, (), 100))
+    np.testing.assert_array_equal(
+        np.concatenate([y for _, _, y, _, _ in parts]), np.concatenate(EVERYTHING.simulate(records))
+    )
+    assert all(names == () and rows.shape == (0, y.size) for _, _, y, names, rows in parts)
+
+
 def joined() -> list[Record]:
     """A fast record and its slow continuation, with a hold between them."""
     fast = record(400)

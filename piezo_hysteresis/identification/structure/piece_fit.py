@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +32,8 @@ from .pieces import WEIGHTS, RecordPiece
 from .prior import WAVES, prior_of, slow_rows
 
 Array = NDArray[np.float64]
+Products = Callable[[Model, Sequence[str]], tuple[Array, Array]]
+"""Matrices and weights as in `PieceFit`, for a model and its free numbers."""
 
 STIFF = 1e-9
 """Damping that keeps undetermined directions at their start, as a share of the diagonal."""
@@ -128,10 +130,14 @@ class PieceFit:
 
 
 def linearised(
-    model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float], names: Sequence[str]
+    model: Model,
+    pieces: Sequence[RecordPiece],
+    floors: Sequence[float],
+    names: Sequence[str],
+    slow: Sequence[Array] | None = None,
 ) -> tuple[Array, Array]:
-    """Matrices and weights of the used pieces, as in `PieceFit`."""
-    slow = slow_rows(pieces, model.displacement_scale)
+    """Matrices and weights of the used pieces, as in `PieceFit`; `slow` are the `slow_rows` of the pieces, if known."""
+    slow = slow or slow_rows(pieces, model.displacement_scale)
     found = grams(model, [p.record for p in pieces], names, None, slow)
     counted = [i for i, p in enumerate(pieces) if WEIGHTS[p.kind] > 0.0]
     weights = np.array([pieces[i].weight for i in counted])
@@ -179,13 +185,17 @@ def fit_pieces(
     max_iterations : int
         Largest number of linearisations.
     """
+    slow = slow_rows(pieces, model.displacement_scale)
+
+    def products(model: Model, names: Sequence[str]) -> tuple[Array, Array]:
+        return linearised(model, pieces, floors, names, slow)
+
     names, damping = tuple(names), FIRST_DAMPING
-    matrices, weights = linearised(model, pieces, floors, names)
-    now = at_its_cost(model, names, matrices, weights)
+    now = at_its_cost(model, names, *products(model, names))
     while now.iterations < max_iterations and now.cost > PERFECT:
         better = None
         while better is None and damping < FARTHEST:
-            better = _step(now, pieces, floors, damping)
+            better = _step(now, products, damping)
             damping = max(damping * (10.0 if better is None else 0.1), 1e-9)
         if better is None:
             break
@@ -197,25 +207,25 @@ def fit_pieces(
     return PieceFit(now.model, names, now.matrices, now.weights, now.cost, converged, now.iterations)
 
 
-def _step(now: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float], damping: float) -> PieceFit | None:
+def _step(now: PieceFit, products: Products, damping: float) -> PieceFit | None:
     total, names = now.total, now.names
     step = best_step(now, total, damping)
     values = now.model.values()
     moved = np.clip([values[n] for n in names] + step[: len(names)], *bounds_of(now.model, names))
     try:
         model = now.model.with_values(dict(zip(names, moved.tolist(), strict=True)))
-        if not _cost(model, pieces, floors, names) < now.cost:  # without slopes, which take most of the time
+        if not _cost(model, names, products) < now.cost:  # without slopes, which take most of the time
             return None
-        matrices, weights = linearised(model, pieces, floors, names)
+        matrices, weights = products(model, names)
     except (DivergenceError, ParameterError):
         return None
     moved_there = at_its_cost(model, names, matrices, weights, now.iterations + 1)
     return moved_there if moved_there.cost < now.cost else None
 
 
-def _cost(model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float], names: Sequence[str]) -> float:
+def _cost(model: Model, names: Sequence[str], products: Products) -> float:
     """Cost as in `PieceFit`, by a free run without slopes."""
-    matrices, weights = linearised(model, pieces, floors, ())
+    matrices, weights = products(model, ())
     own = at_its_cost(model, (), matrices, weights)
     return own.cost + float(prior_of(model, names, matrices.shape[1] - 1)[-1, -1])
 
