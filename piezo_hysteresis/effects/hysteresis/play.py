@@ -31,8 +31,7 @@ def play_positions(v, radius, before, p):
 def play_slopes(v, dv, radius, before, p, slope, dp):
     """Derivatives dp (n,) of `play_positions` p (n,) from dv (n,) and that of `before`, `slope`; returns the last one.
 
-    Where the drive only touches a side of the play, it counts as moving the play if this makes the derivative one for a
-    growing parameter.
+    Where a side of the play just touches the position, the derivative is the one for a growing parameter.
     """
     for i in range(v.size):
         low, high = v[i] - radius, v[i] + radius
