@@ -20,10 +20,12 @@ amplitudes, then all rates but one. The last row has the slowest rate alone and 
 that no error is promised at the fastest rate but the one that the stated uncertainty of the lag allows.
 
 With `--voltage-noise`, the voltage of the records that are fitted was measured with white noise; the stage has not seen
-it, and the records that judge have none.
+it, and the records that judge have none. With `--period`, the samples are farther apart, and the frequencies lower by
+as much: the mode then rings faster than the samples show.
 
     python -m benchmarks.rates --stages 6
     python -m benchmarks.rates --stages 6 --voltage-noise 0.01
+    python -m benchmarks.rates --stages 6 --period 0.005
 """
 
 from __future__ import annotations
@@ -48,11 +50,15 @@ from piezo_hysteresis.record import Experiment
 PERIOD = 5e-4
 """Sample period [s]."""
 FREQUENCIES = (1.0, 10.0, 60.0)
-"""Of the growing sines [Hz]."""
+"""Of the growing sines [Hz]; slower if the sample period is longer."""
+HOLD, HELD = 0.4, 60
+"""Hold before them: time [s], and smallest number of samples."""
 LEVELS = (0.2, 0.4, 0.6, 0.8, 1.0)
 """Amplitudes of the sines, shares of the largest."""
 SMALL = 3
 """Levels that are fitted where the largest are left out."""
+Values = tuple[float, ...]
+"""Frequencies [Hz], or levels."""
 PROMISED = {
     "rate between two": 0.3,
     "slowest rate": 0.65,
@@ -63,10 +69,13 @@ PROMISED = {
 """What is left out, to the error in % of range that the median of the stages may have."""
 
 
-def played(stage: Nanopositioner, frequencies: tuple[float, ...], levels: tuple[float, ...] = LEVELS) -> Experiment:
+def played(
+    stage: Nanopositioner, frequencies: tuple[float, ...], levels: tuple[float, ...] = LEVELS, period: float = PERIOD
+) -> Experiment:
     """A record per frequency."""
-    drives = ((f"sine_{f:g}hz", growing_sine(f, PERIOD, levels)) for f in frequencies)
-    return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives))
+    hold = max(HOLD, HELD * period)
+    drives = ((f"sine_{f:g}hz", growing_sine(f, period, levels, hold=hold)) for f in frequencies)
+    return Experiment(tuple(stage.play(u, period, name) for name, u in drives))
 
 
 def measured(experiment: Experiment, noise: float, rng: np.random.Generator) -> Experiment:
@@ -75,37 +84,38 @@ def measured(experiment: Experiment, noise: float, rng: np.random.Generator) -> 
     return replace(experiment, records=tuple(records))
 
 
-def without_step(stage: Nanopositioner, frequency: float) -> Experiment:
+def without_step(stage: Nanopositioner, frequency: float, period: float) -> Experiment:
     """A record of growing sines that begin at rest."""
-    swing = 0.5 * (1.0 - np.cos(2.0 * np.pi * frequency * PERIOD * np.arange(round(2.0 / frequency / PERIOD))))
+    swing = 0.5 * (1.0 - np.cos(2.0 * np.pi * frequency * period * np.arange(round(2.0 / frequency / period))))
     drive = stage.volt * np.concatenate([level * swing for level in LEVELS])
-    return Experiment((stage.play(drive, PERIOD, f"sine_{frequency:g}hz"),))
+    return Experiment((stage.play(drive, period, f"sine_{frequency:g}hz"),))
 
 
-def cases() -> Iterator[tuple[str, tuple[float, ...], tuple[float, ...], tuple[float, ...]]]:
+def cases(low: float, middle: float, high: float) -> Iterator[tuple[str, Values, Values, Values]]:
     """What is left out; frequencies and levels fitted; frequencies that judge."""
-    low, middle, high = FREQUENCIES
+    frequencies = low, middle, high
     yield "rate between two", (low, high), LEVELS, (middle,)
     yield "slowest rate", (middle, high), LEVELS, (low,)
     yield "fastest rate", (low, middle), LEVELS, (high,)
-    yield "largest amplitudes", FREQUENCIES, LEVELS[:SMALL], FREQUENCIES
-    for f in FREQUENCIES:
-        yield "all rates but one", (f,), LEVELS, tuple(g for g in FREQUENCIES if g != f)
+    yield "largest amplitudes", frequencies, LEVELS[:SMALL], frequencies
+    for f in frequencies:
+        yield "all rates but one", (f,), LEVELS, tuple(g for g in frequencies if g != f)
 
 
-def lag_holds(found: Identification, stage: Nanopositioner) -> bool:
+def lag_holds(found: Identification, stage: Nanopositioner, period: float = PERIOD) -> bool:
     """Whether the 95 % interval of the lag of delay, mode and dynamics holds that of the samples of the stage."""
     value, error = lag(found.fit)
     model = found.model
     if ExtraResonance.name in model and not mode_is_inferred(model):  # that of an inferred mode is part of the lag
         value += lag_of_mode(model)["lag"] * model.sample_period
-    return abs(value - stage.sampled_lag(PERIOD)) < 1.96 * error
+    return abs(value - stage.sampled_lag(period)) < 1.96 * error
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Number of stages."""
     parser.add_argument("--stages", type=int, default=6)
     parser.add_argument("--first", type=int, default=0, help="seed of the first stage")
+    parser.add_argument("--period", type=float, default=PERIOD, help="sample period [s]")
     parser.add_argument("--voltage-noise", type=float, default=0.0, help="of the fitted records [V]")
 
 
@@ -113,20 +123,24 @@ def run(options: argparse.Namespace) -> list[Figures]:
     """One row per kind of what is left out."""
     found: dict[str, list[tuple[float, bool]]] = {}
     one_rate: list[tuple[float, float, bool]] = []
+    period = options.period
+    low, middle, high = (f * PERIOD / period for f in FREQUENCIES)
     for seed in range(options.first, options.first + options.stages):
         rng = np.random.default_rng(seed)
         stage = Nanopositioner.random(rng, mode=float(rng.uniform(250.0, 800.0)))
-        for what, fitted, levels, judged in cases():
-            recorded = measured(played(stage, fitted, levels), options.voltage_noise, rng)
+        for what, fitted, levels, judged in cases(low, middle, high):
+            recorded = measured(played(stage, fitted, levels, period), options.voltage_noise, rng)
             identified = identify(recorded, memory=True)
-            rows = errors(identified.model, played(stage, judged), zero_per_phase(identified.model)).rows
-            holds = lag_holds(identified, stage)
+            rows = errors(
+                identified.model, played(stage, judged, LEVELS, period), zero_per_phase(identified.model)
+            ).rows
+            holds = lag_holds(identified, stage, period)
             found.setdefault(what, []).append((max(r.percent for r in rows), holds))
-        recorded = measured(without_step(stage, FREQUENCIES[0]), options.voltage_noise, rng)
+        recorded = measured(without_step(stage, low, period), options.voltage_noise, rng)
         slowest = identify(recorded, memory=True)
-        (row,) = errors(slowest.model, without_step(stage, FREQUENCIES[-1]), zero_per_phase(slowest.model)).rows
+        (row,) = errors(slowest.model, without_step(stage, high, period), zero_per_phase(slowest.model)).rows
         uncertainty = float(slowest.model.provenance[LAG_ERROR])
-        one_rate.append((row.percent, 100.0 * error_of_lag(uncertainty, FREQUENCIES[-1]), lag_holds(slowest, stage)))
+        one_rate.append((row.percent, 100.0 * error_of_lag(uncertainty, high), lag_holds(slowest, stage, period)))
     table: list[tuple[Cell, ...]] = []
     failures = []
     for what, values in found.items():

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from piezo_hysteresis.discrepancy.residual.residual import errors, zero_per_phase
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.structure.pieces import Kind, RecordPiece
@@ -42,10 +43,27 @@ def test_a_mode_above_half_the_sampling_rate_does_not_change_lag_loop_and_creep(
     assert creep.get("creep.gamma", creep.get("creep_two_rates.gamma_slow")) > 0.002
 
 
+@pytest.mark.parametrize(
+    ("mode", "zeta", "period"),
+    [(592.0, 0.01, 1e-3), (981.0, 0.024, 1e-3), (981.0, 0.024, 5e-4)],
+    ids=["long", "multiple", "half"],
+)
+def test_a_mode_that_the_samples_do_not_resolve_is_described_at_other_rates(mode, zeta, period):
+    """In the samples it rings at another frequency, and it has zeros that no mode has."""
+    stage = Nanopositioner(mode=mode, zeta=zeta)
+    known, unseen = (
+        Experiment(tuple(stage.play(growing_sine(f / period, period, (0.4, 1.0)), period) for f in frequencies))
+        for frequencies in ((1e-3, 0.04), (8e-3,))
+    )
+    found = identify(known, memory=True).model
+    assert found[Arx.name].array("a").size >= 2
+    assert errors(found, unseen, zero_per_phase(found)).percent < 0.15
+
+
 def echo(radius, angle, size=40):
-    """A step of 1 V whose response rings around its final value with these poles."""
+    """A step of 1 V whose response creeps and rings around its final value with these poles."""
     k = np.arange(size)
-    ringing = radius**k * np.cos(angle * k + 0.3)
+    ringing = radius**k * np.cos(angle * k + 0.3) + 0.02 * k
     return RecordPiece(Record(np.ones(size), 1e-6 * (1.0 + ringing), PERIOD, initial_voltage=0.0), 0, Kind.STEP)
 
 

@@ -26,7 +26,7 @@ from ...record import Notice
 from ..records.excitation_content import excitation_content
 from .piece_fit import DELAY, GAIN, POLE, PieceFit, fit_pieces
 from .pieces import Kind, RecordPiece
-from .ringing import RESOLVED, SLOWEST, decay_after_steps, ringing_lines
+from .ringing import RESOLVED, SLOWEST, decay_after_steps, ringing_lines, sampled_decay
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
 
 LAGS = (0.3, 1.5, 4.0)
@@ -52,6 +52,8 @@ SILENT_DAMPING = 0.2
 """Damping ratio assumed for a mode that does not ring; its lag is part of the delay."""
 WHOLE = 0.3
 """Largest deviation from 1 of the share of a mode of the whole stage; with another share it may be an alias."""
+RESOLVES = 0.005
+"""Largest share of the power after a step that a mode leaves; an alias leaves 0.007 to 0.4, a mode up to 0.003."""
 CONTRADICTED = 0.5
 """Largest ratio of the mean square misfits of all other motion without and with the steps if these contradict it."""
 SHAPE, SHARE = tuple(f"{ExtraResonance.name}.{n}" for n in ("f0", "zeta")), f"{ExtraResonance.name}.r"
@@ -110,12 +112,14 @@ def fit_linear_part(
             poles.append(tried)
     lagging = min(poles, key=lambda f: f.cost, default=best)
     best = lagging if lagging.cost < POLE_GAINS * best.cost else best
+    fast = _with_two_more_orders(plain, best, pieces, floors)
+    if fast is not best:
+        return fast, 0.0, 0.0
     apart = without_steps(pieces)
     other = fit_structure(best.model, apart, floors, (*held_by(best), *SHAPE)) if apart else best
     if misfit_beside_steps(other, pieces) < CONTRADICTED * misfit_beside_steps(best, pieces):
         return other, lead, lateness_of_steps(other, pieces)
-    best = _with_two_more_orders(plain, best, pieces, floors)
-    return best, lead if ExtraResonance.name in best.model else 0.0, 0.0
+    return best, lead, 0.0
 
 
 def _with_two_more_orders(
@@ -123,22 +127,27 @@ def _with_two_more_orders(
 ) -> PieceFit:
     """The fit with ARX of two more orders if it describes the response to the steps, else `best`.
 
-    A mode above half the sampling rate rings from sample to sample. The fit begins with a pair of poles that explains
-    the residual after the steps and a pair of equal zeros, which is the response of the fit before. A mode of the whole
-    stage stays.
+    A mode above half the sampling rate rings at another frequency in the samples and has zeros that a mode has not.
+    Therefore such a mode leaves a part of the residual after the steps. A mode that leaves hardly anything stays. The
+    fit begins with the poles of the mode that was found, or with poles that explain the residual after the steps, and
+    with a pair of equal zeros, which is the response of the fit before.
     """
-    has_mode = ExtraResonance.name in best.model
-    if has_mode and abs(best.model.values()[SHARE] - 1.0) <= WHOLE:
+
+    def after_steps(fit: PieceFit) -> float:
+        return _misfit_of(Kind.STEP, fit, pieces)
+
+    rings = ExtraResonance.name in best.model and not mode_is_inferred(best.model)
+    if rings and after_steps(best) < RESOLVES * after_steps(plain):
         return best
-    before = plain if has_mode else best
-    decay = decay_after_steps(before.model, pieces)
+    before = plain if ExtraResonance.name in best.model else best
+    decay = sampled_decay(best.model) if rings else decay_after_steps(before.model, pieces)
     if decay is None:
         return best
     arx = before.model[Arx.name]
     a, b = (np.convolve(c, decay).tolist() for c in ((1.0, *arx.array("a")), arx.array("b")))
     richer = Arx(a=tuple(a[1:]), b=tuple(b), delay=arx["delay"])
     found = fit_structure(before.model.with_effect(richer), pieces, floors)
-    describes = _misfit_of(Kind.STEP, found, pieces) < DESCRIBED * _misfit_of(Kind.STEP, before, pieces)
+    describes = after_steps(found) < DESCRIBED * after_steps(best)
     return found if describes and found.cost < best.cost else best
 
 
@@ -168,7 +177,7 @@ def mode_notices(fit: PieceFit) -> list[Notice]:
     """``ringing`` with the numbers of the mode, if there is one; one that does not ring has the assumed damping."""
     order = fit.model[Arx.name].array("a").size
     if order > 1:
-        said = f"after a step the stage rings faster than half of the sampling rate; ARX of order {order} describes it"
+        said = f"the stage rings after steps; ARX of order {order} describes its samples better than a mode does"
         return [Notice("ringing", said)]
     if ExtraResonance.name not in fit.model:
         return []

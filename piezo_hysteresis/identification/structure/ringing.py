@@ -20,6 +20,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import detrend
 
 from ...effects import ExtraResonance
 from ...model.model import Model
@@ -35,10 +36,12 @@ RESOLVED = 0.45
 SLOWEST = next(p.lower for p in ExtraResonance.parameters if p.name == "f0")
 """Lowest frequency of a mode [Hz]."""
 ECHO = 40
-"""Number of samples after a step from which the decay is estimated; their second half shows where it ends."""
+"""Number of samples after a step from which the decay is estimated."""
 FEWEST = 12
 """Smallest number of such samples."""
-LONGEST = 0.95
+FORCED = 3
+"""Number of samples after a step that depend on the delay and on the zeros, too, and not on the poles alone."""
+LONGEST = 0.98
 """Largest radius of the poles of a decay; a longer one is the work of a mode that the samples show, or creep."""
 SAME_LINE = 1.25
 """Ratio of two frequencies up to which they are one line."""
@@ -147,11 +150,18 @@ def decay_after_steps(model: Model, pieces: Sequence[RecordPiece]) -> Array | No
     pieces : sequence of RecordPiece
         Pieces in order.
     """
-    echoes = [e[:ECHO] for _, _, after in _echoes(model, pieces, (Kind.STEP,), FEWEST) for e in after]
+    echoes = [e[FORCED:ECHO] for _, _, after in _echoes(model, pieces, (Kind.STEP,), FEWEST) for e in after]
     if not echoes:
         return None
-    echoes = [e - e[e.size // 2 :].mean() for e in echoes]
-    before = np.concatenate([np.column_stack((e[1:-1], e[:-2])) for e in echoes])
-    after = np.concatenate([e[2:] for e in echoes])
-    decay = np.append(1.0, -np.linalg.lstsq(before, after, rcond=None)[0])
+    # the residual is also slow motion, such as creep, which is a straight line in this time
+    columns = np.concatenate([detrend(np.column_stack((e[2:], e[1:-1], e[:-2])), axis=0) for e in echoes])
+    decay = np.append(1.0, -np.linalg.lstsq(columns[:, 1:], columns[:, 0], rcond=None)[0])
     return decay if np.abs(np.roots(decay)).max(initial=0.0) < LONGEST else None
+
+
+def sampled_decay(model: Model) -> Array:
+    """The same coefficients of the samples of a mode with the frequency and damping of the mode of `model`."""
+    mode = model[ExtraResonance.name]
+    angle = 2.0 * np.pi * mode["f0"] * model.sample_period
+    pole = np.exp(angle * (1j * np.sqrt(1.0 - mode["zeta"] ** 2) - mode["zeta"]))
+    return np.array([1.0, -2.0 * pole.real, abs(pole) ** 2])
