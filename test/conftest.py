@@ -22,8 +22,8 @@ Tests of real processes over DDS need the processor in time. One that fails is t
 promise that does not hold fails twice, a computer that was busy elsewhere does not. Nor does it fail a property: no
 example has a deadline.
 
-A shell starts a background job with SIGINT ignored, and every process below it inherits that. Tests that interrupt
-nodes need the signal to arrive.
+A shell starts a background job with SIGINT ignored, and nohup its command with SIGHUP ignored, and every process below
+inherits that. Tests that send these signals need them to arrive.
 
 Diagnoses use one core, because the processes of the tests share the cores already.
 """
@@ -39,6 +39,8 @@ settings.register_profile("patient", deadline=None)
 settings.load_profile("patient")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.hookimpl(tryfirst=True)
