@@ -14,7 +14,9 @@
 
 """Recalibration of a group on the last minute: closed changes come back, and others are refused with what will do."""
 
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -48,20 +50,42 @@ def run(model):
     return model.run(u, model.rest(u[0]))[0]
 
 
-def stream(changed, noise=NOISE, seed=0, changed_at=CHANGED):
-    """Watch, predictor and recent samples after a stream that becomes `changed` after some time."""
-    u = drive()
-    y = np.where(PERIOD * np.arange(u.size) < changed_at, run(MODEL), changed)
-    y = y + noise * np.random.default_rng(seed).standard_normal(u.size)
-    predictor, watch, recent = Predictor(PERIOD, MODEL), ChangeWatch(INTERVAL), RecentDisplacement(PERIOD)
-    for first in range(0, u.size, BLOCK):
+@cache
+def unchanged():
+    return run(MODEL)
+
+
+def feed(streams, y, begin, end):
+    """Give the samples of some blocks to watch, predictor and recent samples."""
+    u, (watch, predictor, recent) = drive(), streams
+    for first in range(begin, end, BLOCK):
         part = slice(first, first + BLOCK)
         if first * PERIOD == 2.0:
             watch.take_baseline(60.0)
         answer = predictor.predict(first, round(first * PERIOD * 1e9), u[part], y[part])
         watch.add(u[part], answer, predictor, round((first + BLOCK) * PERIOD * 1e9))
         recent.add(first, y[part])
-    return watch, predictor, recent
+
+
+def noisy(y, noise, seed):
+    return y + noise * np.random.default_rng(seed).standard_normal(y.size)
+
+
+@cache
+def before_change(noise, seed, end):
+    """What all streams of this noise have in common: it is copied and goes on."""
+    streams = ChangeWatch(INTERVAL), Predictor(PERIOD, MODEL), RecentDisplacement(PERIOD)
+    feed(streams, noisy(unchanged(), noise, seed), 0, end)
+    return streams
+
+
+def stream(changed, noise=NOISE, seed=0, changed_at=CHANGED):
+    """Watch, predictor and recent samples after a stream that becomes `changed` after some time."""
+    y = noisy(np.where(PERIOD * np.arange(changed.size) < changed_at, unchanged(), changed), noise, seed)
+    begin = int(changed_at / PERIOD) // BLOCK * BLOCK
+    streams = deepcopy(before_change(noise, seed, begin))
+    feed(streams, y, begin, y.size)
+    return streams
 
 
 def fit(changed, **options):

@@ -39,9 +39,13 @@ def played(stage, period, frequencies):
     return Experiment(tuple(stage.play(u, period, name) for name, u in drives))
 
 
+@pytest.fixture(scope="module")
+def model():
+    return identify(played(STAGE, PERIOD, (1.0, 10.0, 60.0)), memory=True).model
+
+
 @pytest.mark.parametrize("share", [0.5, 0.3])
-def test_faster_records_are_compared_with_the_given_model(share):
-    model = identify(played(STAGE, PERIOD, (1.0, 10.0, 60.0)), memory=True).model
+def test_faster_records_are_compared_with_the_given_model(model, share):
     another_day = STAGE.on_another_day(np.random.default_rng(5))
     same = diagnose(played(another_day, share * PERIOD, (1.0, 10.0, 60.0)), model)
     assert [n.kind for n in same.experiment.notices].count(RESAMPLED) == 1
