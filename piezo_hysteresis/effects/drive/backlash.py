@@ -26,6 +26,7 @@ from ...inverse_terms import InverseStart, InverseTerms
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
+from ..hysteresis.play import play_positions
 from ..invertibility import Invertibility
 
 START_VALUES = (0.001, 0.002, 0.005, 0.01)
@@ -63,18 +64,8 @@ class Backlash(Effect):
 
 
 @kernel
-def run_play(x, b, state, y):
-    """Output y (n,) of a play of half width b; state [y] is updated."""
-    held = state[0]
-    for i in range(x.size):
-        held = max(x[i] - b, min(x[i] + b, held))
-        y[i] = held
-    state[0] = held
-
-
-@kernel
 def linearise_play(x, dx, b, state, tangent, y, dy):
-    """`run_play` and its derivatives: dx (m, n) to dy (m + 1, n), the last row by b; tangent (m + 1,) is updated.
+    """`play_positions` y (n,) and its derivatives: dx (m, n) to dy (m + 1, n), the last row by b; tangent (m + 1,) is updated.
 
     Where an edge just touches the output, the derivative is the one for a growing parameter.
     """
@@ -105,7 +96,7 @@ class BacklashBlock(HeldBlock):
         self.b = b
 
     def follow(self, x: Array, state: State, y: Array) -> None:
-        run_play(x, self.b, state, y)
+        state[0] = play_positions(x, self.b, state[0], y)
 
     def follow_tangent(self, x: Array, dx: Array, state: State, tangent: State, y: Array, dy: Array) -> None:
         linearise_play(x, dx, self.b, state, tangent, y, dy)

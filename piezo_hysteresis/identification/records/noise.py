@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from ...effects.drive.backlash import run_play
+from ...effects.hysteresis.play import play_positions
 from ...record import Experiment, Notice, Record, Samples
 
 GAUSSIAN = 1.4826
@@ -129,7 +129,7 @@ def quieted(record: Record, noise: float) -> Record:
     smooth = _smooth(np.array(record.voltage), noise)
     forward, backward = np.empty(smooth.size), np.empty(smooth.size)
     for drive, followed in ((smooth, forward), (smooth[::-1].copy(), backward)):
-        run_play(drive, WIDTH * noise, drive[:1].copy(), followed)
+        play_positions(drive, WIDTH * noise, drive[0], followed)
     return replace(record, voltage=0.5 * (forward + backward[::-1]))
 
 
