@@ -65,7 +65,7 @@ class Backlash(Effect):
 
 @kernel
 def linearise_play(x, dx, b, state, tangent, y, dy):
-    """`play_positions` y (n,) and its derivatives: dx (m, n) to dy (m + 1, n), the last row by b; tangent (m + 1,) is updated.
+    """`play_positions` y (n,) and derivatives: dx (m, n) to dy (m + 1, n), the last by b; tangent (m + 1,) is updated.
 
     Where an edge just touches the output, the derivative is the one for a growing parameter.
     """

@@ -53,7 +53,7 @@ SILENT_DAMPING = 0.2
 WHOLE = 0.3
 """Largest deviation from 1 of the share of a mode of the whole stage; with another share it may be an alias."""
 RESOLVES = 0.005
-"""Largest share of the power after a step that a mode leaves; an alias leaves 0.007 to 0.4, a mode up to 0.003."""
+"""Largest share of the power after a step that a mode leaves; an alias leaves 0.007 to 0.4, most modes below 0.003."""
 CONTRADICTED = 0.5
 """Largest ratio of the mean square misfits of all other motion without and with the steps if these contradict it."""
 SHAPE, SHARE = tuple(f"{ExtraResonance.name}.{n}" for n in ("f0", "zeta")), f"{ExtraResonance.name}.r"
@@ -116,7 +116,7 @@ def fit_linear_part(
     if fast is not best:
         return fast, 0.0, 0.0
     apart = without_steps(pieces)
-    other = fit_structure(best.model, apart, floors, (*held_by(best), *SHAPE)) if apart else best
+    other = fit_structure(best.model, apart, floors, (*held_by(best), *SHAPE, SHARE)) if apart else best
     if misfit_beside_steps(other, pieces) < CONTRADICTED * misfit_beside_steps(best, pieces):
         return other, lead, lateness_of_steps(other, pieces)
     return best, lead, 0.0
