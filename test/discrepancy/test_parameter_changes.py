@@ -27,7 +27,7 @@ from piezo_hysteresis.discrepancy.changes.recalibration import recalibrate
 from piezo_hysteresis.discrepancy.changes.same_stage import sentence_of
 from piezo_hysteresis.discrepancy.diagnose import compared_with_given
 from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
-from piezo_hysteresis.discrepancy.passes import compare_with_given_model, quiet_voltage
+from piezo_hysteresis.discrepancy.passes import compare_with_given_model, prepare
 from piezo_hysteresis.discrepancy.residual.noise_floor import floors
 from piezo_hysteresis.discrepancy.residual.residual import errors, zero_per_phase
 from piezo_hysteresis.effects import CATALOGUE
@@ -193,7 +193,7 @@ def test_the_data_of_a_model_are_recognised_if_the_voltage_was_measured(model, k
     recorded = Experiment(tuple(played_noisy))
     off = replace(model, displacement_scale=1.1 * model.displacement_scale)
     given = replace(off, provenance={**off.provenance, **({"data_hash": data_hash(recorded)} if known else {})})
-    state = quiet_voltage(DiagnosisState(recorded, given, CATALOGUE, lambda word, part: None, given=recorded))
+    state = prepare(DiagnosisState(recorded, given, CATALOGUE, lambda word, part: None, given=recorded))
     assert state.experiment is not recorded
     assert isinstance(compare_with_given_model(state), DiagnosisState if known else Diagnosis)
 

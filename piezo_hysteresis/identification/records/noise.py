@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import savgol_coeffs, savgol_filter
+import scipy
 
 from ...effects.hysteresis.play import play_positions
 from ...record import Experiment, Notice, Record, Samples
@@ -143,8 +143,8 @@ def _smooth(values: Samples, noise: float) -> Samples:
     for window in WINDOWS:
         if window > values.size:
             break
-        fit = savgol_filter(values, window, 3)
-        error = AGREE * noise * float(np.linalg.norm(savgol_coeffs(window, 3)))
+        fit = scipy.signal.savgol_filter(values, window, 3)
+        error = AGREE * noise * float(np.linalg.norm(scipy.signal.savgol_coeffs(window, 3)))
         low, high = np.maximum(low, fit - error), np.minimum(high, fit + error)
         found = np.where(low <= high, fit, found)
     return found

@@ -19,8 +19,8 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import detrend
 
 from ...effects import ExtraResonance
 from ...model.model import Model
@@ -154,7 +154,7 @@ def decay_after_steps(model: Model, pieces: Sequence[RecordPiece]) -> Array | No
     if not echoes:
         return None
     # the residual is also slow motion, such as creep, which is a straight line in this time
-    columns = np.concatenate([detrend(np.column_stack((e[2:], e[1:-1], e[:-2])), axis=0) for e in echoes])
+    columns = np.concatenate([scipy.signal.detrend(np.column_stack((e[2:], e[1:-1], e[:-2])), axis=0) for e in echoes])
     decay = np.append(1.0, -np.linalg.lstsq(columns[:, 1:], columns[:, 0], rcond=None)[0])
     return decay if np.abs(np.roots(decay)).max(initial=0.0) < LONGEST else None
 
