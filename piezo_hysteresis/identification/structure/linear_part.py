@@ -137,7 +137,7 @@ def _with_two_more_orders(
         return _misfit_of(Kind.STEP, fit, pieces)
 
     rings = ExtraResonance.name in best.model and not mode_is_inferred(best.model)
-    if rings and after_steps(best) < RESOLVES * after_steps(plain):
+    if rings and not after_steps(best) > RESOLVES * after_steps(plain):  # also without any step
         return best
     before = plain if ExtraResonance.name in best.model else best
     decay = sampled_decay(best.model) if rings else decay_after_steps(before.model, pieces)
