@@ -26,7 +26,7 @@ from ..model.model import Model
 from ..parameter import slew_text
 from ..record import Experiment, Notice, Record
 from .records.excitation_content import MOVES, excitation_content, moving
-from .records.noise import quieted, voltage_noise
+from .records.noise import voltage_noise
 from .steps.remaining_lag import error_of_lag
 
 LOWEST, HIGHEST = "voltage_min", "voltage_max"
@@ -44,6 +44,8 @@ BEYOND, FASTER, SLOWER = 0.02, 1.5, 3.0
 
 The influence of a lag or a mode grows with the frequency, that of creep with its logarithm.
 """
+ABOVE = 4.0
+"""Standard deviations of the noise of a measured voltage that count for no motion between two samples."""
 STEEP = 0.99
 """Share of the moving samples whose rate is at most the rate of a record."""
 
@@ -97,7 +99,6 @@ def _outside_of(model: Model, record: Record) -> Iterator[Notice]:
         return
     low, high, slowest, fastest, steepest = (float(model.provenance[key]) for key in KEYS)
     room = BEYOND * (high - low)
-    record = quieted(record, float(voltage_noise((record,))[0]))
     least, most = float(record.voltage.min()), float(record.voltage.max())
     content = excitation_content(record)
     if least < low - room or most > high + room:
@@ -127,6 +128,6 @@ def _lag_error(model: Model, frequency: float) -> str:
 
 
 def _slew_rate(record: Record) -> float:
-    steps = np.abs(np.diff(record.voltage))
+    steps = np.abs(np.diff(record.voltage)) - ABOVE * voltage_noise((record,))[0]
     moving = steps[steps > 0.0]
     return float(np.quantile(moving, STEEP)) / record.sample_period if moving.size else 0.0

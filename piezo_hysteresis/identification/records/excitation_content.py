@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...record import Record, Samples
-from .noise import noise_of, noise_on_motion, quieted, voltage_noise
+from .noise import noise_of, noise_on_motion, voltage_noise
 from .steady_waves import is_row_of_waves
 
 SLOW = 30.0
@@ -115,7 +115,7 @@ def excitation_content(record: Record) -> ExcitationContent:
     slowest = max(float(frequency[np.searchsorted(grown, (1.0 - MARKED) * total)]), 0.5 / record.duration)
     lines = int(np.searchsorted(np.cumsum(np.sort(power)[::-1]), MARKED * total)) + 1
     moments = min(_spread(speed), _spread(np.diff(speed)))
-    waves = is_row_of_waves(quieted(record, noise).voltage, record.sample_period, bandwidth)
+    waves = is_row_of_waves(record.voltage, record.sample_period, bandwidth, noise)
     levels = _holds_levels(record.voltage, max(HELD, round(RINGS / record.sample_period)))
     return ExcitationContent(span, bandwidth, slowest, lines, moments, noise_of(record), waves, levels)
 

@@ -25,6 +25,8 @@ from ...turning_points import find_turns as plain_find_turns
 
 SWING = 0.005
 """A turning point counts if the drive goes back by this share of its range."""
+ABOVE = 10.0
+"""The same, in standard deviations of the noise that the drive was measured with."""
 ALIKE = 0.05
 """Largest relative difference between the durations of two swings of one rate."""
 FEWEST = 3
@@ -41,7 +43,7 @@ find_turns = kernel(plain_find_turns)
 """`turning_points.find_turns`, compiled."""
 
 
-def is_row_of_waves(voltage: Samples, sample_period: float, bandwidth: float) -> bool:
+def is_row_of_waves(voltage: Samples, sample_period: float, bandwidth: float, noise: float = 0.0) -> bool:
     """True for sines or triangles of a few rates one after another, of any amplitudes.
 
     The frequencies of a short wave are spread, but they determine the response at its rate only.
@@ -54,6 +56,8 @@ def is_row_of_waves(voltage: Samples, sample_period: float, bandwidth: float) ->
         Time between samples [s].
     bandwidth : float
         Bandwidth of the drive [Hz].
+    noise : float
+        Noise of the voltage [V]; smaller turns than `ABOVE` times it are no turns.
 
     Examples
     --------
@@ -63,7 +67,7 @@ def is_row_of_waves(voltage: Samples, sample_period: float, bandwidth: float) ->
     (True, False)
     """
     turns = np.empty(voltage.size, np.int64)
-    count = find_turns(voltage, SWING * float(np.ptp(voltage)), False, turns)
+    count = find_turns(voltage, max(SWING * float(np.ptp(voltage)), ABOVE * noise), False, turns)
     if count <= FEWEST:
         return False
     rates, covered, shortest = _rows(np.diff(turns[:count]))
