@@ -131,9 +131,8 @@ def run(options: argparse.Namespace) -> list[Figures]:
         for what, fitted, levels, judged in cases(low, middle, high):
             recorded = measured(played(stage, fitted, levels, period), options.voltage_noise, rng)
             identified = identify(recorded, memory=True)
-            rows = errors(
-                identified.model, played(stage, judged, LEVELS, period), zero_per_phase(identified.model)
-            ).rows
+            unseen = played(stage, judged, LEVELS, period)
+            rows = errors(identified.model, unseen, zero_per_phase(identified.model)).rows
             holds = lag_holds(identified, stage, period)
             found.setdefault(what, []).append((max(r.percent for r in rows), holds))
         recorded = measured(without_step(stage, low, period), options.voltage_noise, rng)
