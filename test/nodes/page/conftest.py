@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One browser for the tests of a file (skipped where there is none), and a lab on the launch files' transports.
+"""One browser for the tests of a file (skipped where there is none), and a lab with room for readers that are killed.
 
-A process reads the profile of its transports once: all files of this folder have to take the same one, or the lab of a
-later file meets nodes that it cannot reach.
+A process reads the profile of its transports once, and each of its later labs has the same: so it has to be one that
+also reaches nodes without a profile, over shared memory alone.
 """
 
 import os
@@ -30,9 +30,9 @@ from .browser import CHROMIUM, Browser
 
 TRANSPORTS = {
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-    "FASTDDS_DEFAULT_PROFILES_FILE": str(Path(__file__).parents[3] / "config" / "launch_transports.xml"),
+    "FASTDDS_DEFAULT_PROFILES_FILE": str(Path(__file__).parents[3] / "config" / "large_blocks.xml"),
 }
-"""As the launch files set them, but for this machine only."""
+"""The shared memory of the launch files, without the network."""
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def shared_lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
-    """One lab for all tests of a file, on the transports of the launch files."""
+    """One lab for all tests of a file, with room for readers that are killed."""
     with pytest.MonkeyPatch.context() as patch:
         for name, value in TRANSPORTS.items():
             patch.setenv(name, value)
