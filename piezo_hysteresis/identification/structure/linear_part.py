@@ -101,17 +101,7 @@ def fit_linear_part(
     """
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in LAGS]
     plain = min(found, key=lambda f: f.cost)
-    best = _with_mode(plain, pieces, floors)
-    held = held_by(best)
-    lead = float(np.log(plain.cost / best.cost)) if set(SHAPE) & set(best.names) else 0.0
-    poles = []
-    for pole in (0.3, 0.8):
-        arx = Arx(a=(-pole,), b=(1.0 - pole,), delay=best.model[Arx.name]["delay"])
-        tried = fit_structure(best.model.with_effect(arx), pieces, floors, held)
-        if tried.model.values()[POLE] < 0.0:
-            poles.append(tried)
-    lagging = min(poles, key=lambda f: f.cost, default=best)
-    best = lagging if lagging.cost < POLE_GAINS * best.cost else best
+    best, lead = _with_pole_and_mode(plain, pieces, floors)
     fast = _with_two_more_orders(plain, best, pieces, floors)
     if fast is not best:
         return fast, 0.0, 0.0
@@ -120,6 +110,50 @@ def fit_linear_part(
     if misfit_beside_steps(other, pieces) < CONTRADICTED * misfit_beside_steps(best, pieces):
         return other, lead, lateness_of_steps(other, pieces)
     return best, lead, 0.0
+
+
+def _with_pole_and_mode(
+    plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]
+) -> tuple[PieceFit, float]:
+    """The fit with a mode and a pole, if they help, and the lead of a ringing mode.
+
+    A slow pole hides the mode: without it, what is left after a step is the lag of the pole. Therefore the mode is also
+    searched after the pole, unless one that rings was found before it.
+    """
+    ringing = _with_mode(plain, pieces, floors)
+    best = _with_pole(ringing, pieces, floors)
+    if not _is_whole(best):
+        lagging = _with_pole(plain, pieces, floors)
+        if lagging is not plain:
+            behind = _with_mode(lagging, pieces, floors)
+            if behind.cost < best.cost:
+                return behind, _lead(lagging, behind)
+    return best, _lead(plain, best)
+
+
+def _with_pole(start: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
+    """The fit with a pole, if it lowers the cost by enough."""
+    held, poles = held_by(start), []
+    for pole in (0.3, 0.8):
+        arx = Arx(a=(-pole,), b=(1.0 - pole,), delay=start.model[Arx.name]["delay"])
+        tried = fit_structure(start.model.with_effect(arx), pieces, floors, held)
+        if tried.model.values()[POLE] < 0.0:
+            poles.append(tried)
+    lagging = min(poles, key=lambda f: f.cost, default=start)
+    return lagging if lagging.cost < POLE_GAINS * start.cost else start
+
+
+def _is_whole(fit: PieceFit) -> bool:
+    """Whether a mode of the whole stage rings."""
+    if ExtraResonance.name not in fit.model:
+        return False
+    mode = fit.model[ExtraResonance.name]
+    return abs(mode["r"] - 1.0) <= WHOLE and mode["zeta"] <= RINGS and not mode_is_inferred(fit.model)
+
+
+def _lead(without: PieceFit, found: PieceFit) -> float:
+    """ln of the factor by which a ringing mode lowers the cost; 0 without such a mode."""
+    return float(np.log(without.cost / found.cost)) if set(SHAPE) & set(found.names) else 0.0
 
 
 def _with_two_more_orders(
