@@ -24,7 +24,7 @@ from ...effects import Arx, ExtraResonance
 from ...model.model import Model
 from ...record import Notice
 from ..records.excitation_content import excitation_content
-from .piece_fit import DELAY, GAIN, POLE, PieceFit, fit_pieces
+from .piece_fit import DELAY, GAIN, POLE, Array, PieceFit, fit_pieces
 from .pieces import Kind, RecordPiece
 from .ringing import RESOLVED, SLOWEST, decay_after_steps, ringing_lines, sampled_decay
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
@@ -35,6 +35,14 @@ RINGING_STAYS = 0.7
 """A mode is accepted if at most this share of the power in pieces of the kind that rings remains."""
 DESCRIBED = 0.1
 """Two more orders of the ARX dynamics are accepted if at most this share of the power after a step remains."""
+START_POLES = (0.3, 0.8)
+"""Start values of a pole."""
+ADDED = 0.5
+"""Start value of a second pole, and of the zero that cancels it."""
+SETTLED = 4.0
+"""Mean square misfit after a step [floors²] up to which nothing else is tried."""
+SECOND = 0.5
+"""Dynamics of second order are accepted if at most this share of the power after a step remains."""
 POLE_GAINS = 0.98
 """A pole is accepted if at most this share of the cost remains."""
 SILENT_GAINS = 0.8
@@ -101,7 +109,7 @@ def fit_linear_part(
     """
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in LAGS]
     plain = min(found, key=lambda f: f.cost)
-    best, lead = _with_pole_and_mode(plain, pieces, floors)
+    best, lead = _with_poles_and_mode(plain, pieces, floors)
     fast = _with_two_more_orders(plain, best, pieces, floors)
     if fast is not best:
         return fast, 0.0, 0.0
@@ -112,29 +120,44 @@ def fit_linear_part(
     return best, lead, 0.0
 
 
-def _with_pole_and_mode(
+def _with_poles_and_mode(
     plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]
 ) -> tuple[PieceFit, float]:
-    """The fit with a mode and a pole, if they help, and the lead of a ringing mode.
+    """The fit with a mode, and dynamics of first or second order, if they help, and the lead of a ringing mode.
 
-    A slow pole hides the mode: without it, what is left after a step is the lag of the pole. Therefore the mode is also
-    searched after the pole, unless one that rings was found before it.
+    Until a low-pass is part of the model, its lag is most of what is left after a step, and hides the mode. Therefore
+    the mode is also searched behind a pole, and behind dynamics of second order, unless a mode of the whole stage
+    describes the steps.
     """
-    ringing = _with_mode(plain, pieces, floors)
-    best = _with_pole(ringing, pieces, floors)
-    if not _is_whole(best):
-        lagging = _with_pole(plain, pieces, floors)
-        if lagging is not plain:
-            behind = _with_mode(lagging, pieces, floors)
-            if behind.cost < best.cost:
-                return behind, _lead(lagging, behind)
-    return best, _lead(plain, best)
+
+    def after_steps(fit: PieceFit) -> float:
+        return _misfit_of(Kind.STEP, fit, pieces)
+
+    def is_settled(fit: PieceFit) -> bool:
+        return _rings_as_a_whole(fit.model) and not after_steps(fit) > SETTLED
+
+    best, without = _with_pole(_with_mode(plain, pieces, floors), pieces, floors), plain
+    if is_settled(best):
+        return best, _lead(plain, best)
+    lagging = _with_pole(plain, pieces, floors)
+    if lagging is not plain and not _rings_as_a_whole(best.model):
+        behind = _with_mode(lagging, pieces, floors)
+        if set(SHAPE) <= set(behind.names) and behind.cost < best.cost:
+            best, without = behind, lagging
+    if not is_settled(best) and np.isfinite(after_steps(best)):
+        tried = [_with_second_order(best, pieces, floors)]
+        if not _rings_as_a_whole(tried[0].model):
+            tried.append(_with_mode(_with_second_order(lagging, pieces, floors), pieces, floors))
+        second = min(tried, key=lambda f: f.cost)
+        if after_steps(second) < SECOND * after_steps(best):
+            best, without = second, lagging
+    return best, _lead(without, best)
 
 
 def _with_pole(start: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
     """The fit with a pole, if it lowers the cost by enough."""
     held, poles = held_by(start), []
-    for pole in (0.3, 0.8):
+    for pole in START_POLES:
         arx = Arx(a=(-pole,), b=(1.0 - pole,), delay=start.model[Arx.name]["delay"])
         tried = fit_structure(start.model.with_effect(arx), pieces, floors, held)
         if tried.model.values()[POLE] < 0.0:
@@ -143,12 +166,26 @@ def _with_pole(start: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[
     return lagging if lagging.cost < POLE_GAINS * start.cost else start
 
 
-def _is_whole(fit: PieceFit) -> bool:
-    """Whether a mode of the whole stage rings."""
-    if ExtraResonance.name not in fit.model:
+def _with_second_order(start: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
+    """The fit with ARX dynamics of second order."""
+    one = (1.0, -ADDED)
+    factor = one if start.model[Arx.name].array("a").size else np.convolve(one, one)
+    return fit_structure(_with_factor(start.model, factor), pieces, floors, held_by(start))
+
+
+def _with_factor(model: Model, factor: Sequence[float] | Array) -> Model:
+    """The model with further poles, and zeros that cancel them: the fit begins with the same response."""
+    arx = model[Arx.name]
+    a, b = (np.convolve(c, factor).tolist() for c in ((1.0, *arx.array("a")), arx.array("b")))
+    return model.with_effect(Arx(a=tuple(a[1:]), b=tuple(b), delay=arx["delay"]))
+
+
+def _rings_as_a_whole(model: Model) -> bool:
+    """Whether there is a mode that rings and is that of the whole stage."""
+    if ExtraResonance.name not in model or mode_is_inferred(model):
         return False
-    mode = fit.model[ExtraResonance.name]
-    return abs(mode["r"] - 1.0) <= WHOLE and mode["zeta"] <= RINGS and not mode_is_inferred(fit.model)
+    mode = model[ExtraResonance.name]
+    return abs(mode["r"] - 1.0) <= WHOLE and mode["zeta"] <= RINGS
 
 
 def _lead(without: PieceFit, found: PieceFit) -> float:
@@ -177,10 +214,7 @@ def _with_two_more_orders(
     decay = sampled_decay(best.model) if rings else decay_after_steps(before.model, pieces)
     if decay is None:
         return best
-    arx = before.model[Arx.name]
-    a, b = (np.convolve(c, decay).tolist() for c in ((1.0, *arx.array("a")), arx.array("b")))
-    richer = Arx(a=tuple(a[1:]), b=tuple(b), delay=arx["delay"])
-    found = fit_structure(before.model.with_effect(richer), pieces, floors)
+    found = fit_structure(_with_factor(before.model, decay), pieces, floors)
     describes = after_steps(found) < DESCRIBED * after_steps(best)
     return found if describes and found.cost < best.cost else best
 
@@ -209,12 +243,12 @@ def lag_of_mode(model: Model) -> dict[str, float]:
 
 def mode_notices(fit: PieceFit) -> list[Notice]:
     """``ringing`` with the numbers of the mode, if there is one; one that does not ring has the assumed damping."""
-    order = fit.model[Arx.name].array("a").size
-    if order > 1:
-        said = f"the stage rings after steps; ARX of order {order} describes its samples better than a mode does"
-        return [Notice("ringing", said)]
     if ExtraResonance.name not in fit.model:
-        return []
+        poles = np.roots((1.0, *fit.model[Arx.name].array("a")))
+        if not any(_damping(p) <= RINGS for p in poles):
+            return []
+        said = f"the stage rings after steps; ARX of order {poles.size} describes its samples better than a mode does"
+        return [Notice("ringing", said)]
     mode = fit.model[ExtraResonance.name]
     shown = f"a mode at {mode['f0']:.4g} Hz with"
     if not mode_is_inferred(fit.model):
@@ -225,6 +259,14 @@ def mode_notices(fit: PieceFit) -> list[Notice]:
             "but its frequency, damping and share and the delay are not determined separately and have no intervals"
         )
     return [Notice("ringing", said)]
+
+
+def _damping(pole: complex) -> float:
+    """Damping ratio of a pole of the samples; 1 for one that is real and positive, or 0."""
+    if pole == 0.0:
+        return 1.0
+    decay = np.log(complex(pole))
+    return float(-decay.real / abs(decay))
 
 
 def _with_mode(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
