@@ -21,11 +21,13 @@ that no error is promised at the fastest rate but the one that the stated uncert
 
 With `--voltage-noise`, the voltage of the records that are fitted was measured with white noise; the stage has not seen
 it, and the records that judge have none. With `--period`, the samples are farther apart, and the frequencies lower by
-as much: the mode then rings faster than the samples show.
+as much: the mode then rings faster than the samples show. With `--filter`, the sensor has a filter: a pole of that time
+constant, a Butterworth low-pass of second order, or the mean of the last samples.
 
     python -m benchmarks.rates --stages 6
     python -m benchmarks.rates --stages 6 --voltage-noise 0.01
     python -m benchmarks.rates --stages 6 --period 0.005
+    python -m benchmarks.rates --stages 6 --filter twice 0.001
 """
 
 from __future__ import annotations
@@ -117,6 +119,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first stage")
     parser.add_argument("--period", type=float, default=PERIOD, help="sample period [s]")
     parser.add_argument("--voltage-noise", type=float, default=0.0, help="of the fitted records [V]")
+    parser.add_argument(
+        "--filter", nargs=2, metavar=("KIND", "TIME"), help="pole, twice or mean; time constant, or mean delay [s]"
+    )
 
 
 def run(options: argparse.Namespace) -> list[Figures]:
@@ -125,9 +130,10 @@ def run(options: argparse.Namespace) -> list[Figures]:
     one_rate: list[tuple[float, float, bool]] = []
     period = options.period
     low, middle, high = (f * PERIOD / period for f in FREQUENCIES)
+    filtered = {f"filter_{options.filter[0]}": float(options.filter[1])} if options.filter else {}
     for seed in range(options.first, options.first + options.stages):
         rng = np.random.default_rng(seed)
-        stage = Nanopositioner.random(rng, mode=float(rng.uniform(250.0, 800.0)))
+        stage = Nanopositioner.random(rng, mode=float(rng.uniform(250.0, 800.0)), **filtered)
         for what, fitted, levels, judged in cases(low, middle, high):
             recorded = measured(played(stage, fitted, levels, period), options.voltage_noise, rng)
             identified = identify(recorded, memory=True)

@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import ExtraResonance
+from ...effects import ExtraResonance, Softening
 from ...model.model import Model
 from ...record import Record
 from ..search.cross_validation import ADEQUATE
@@ -39,9 +39,11 @@ Array = NDArray[np.float64]
 
 EXPLAINS = 0.7
 """Largest share of V that a change may leave, relative to V with fitted gain, loop height and zero."""
-NEARLY_ALL, NEARLY_ALL_OF_A_LAG = 0.01, 0.08
-"""Largest share of V that a change may leave if V remains above `LEAVES`. No form describes a large change exactly, and
-samples do not show the form of a lag between them."""
+NEARLY_ALL, NEARLY_ALL_OF_A_SHAPE = 0.08, 0.01
+"""Largest share of V that a change may leave if V remains above `LEAVES`, because no form describes a large change
+exactly. Gain, loop height and softening change the shape of the loop, and together they resemble another loop."""
+SHAPES_OF_LOOPS = ("gain", "loop", Softening.name)
+"""Changes of the shape of the loop."""
 SEEN = 0.7
 """Smallest size of a reported change, RMS in floors."""
 RIVAL = 1.15
@@ -110,7 +112,7 @@ def find_change(
     if found[0] in sides:  # of gain and loop height, the one that is farther from what differs from day to day
         found.sort(key=lambda e: e is not max(sides, key=lambda s: _in_deviations(s.search, s.account, s.account.key)))
     best, search = found[0].account, found[0].search
-    share = NEARLY_ALL_OF_A_LAG if best.key in SHAPES else NEARLY_ALL
+    share = NEARLY_ALL_OF_A_SHAPE if best.key in SHAPES_OF_LOOPS else NEARLY_ALL
     leaves = best.left < max(LEAVES, share * day.cost)
     if not (leaves and best.cost < EXPLAINS * day.cost and day.cost - best.cost > SEEN**2):
         return None

@@ -41,8 +41,11 @@ ADDED = 0.5
 """Start value of a second pole, and of the zero that cancels it."""
 SETTLED = 4.0
 """Mean square misfit after a step [floors²] up to which nothing else is tried."""
+SLOW = 0.8
+"""Largest real pole that is added; a slower one, which a zero nearly cancels, would take the place of creep."""
 SECOND = 0.5
-"""Dynamics of second order are accepted if at most this share of the power after a step remains."""
+"""Beside a ringing mode, dynamics of second order are accepted if at most this share of the power after a step remains;
+without one, `DESCRIBED` counts."""
 POLE_GAINS = 0.98
 """A pole is accepted if at most this share of the cost remains."""
 SILENT_GAINS = 0.8
@@ -145,11 +148,12 @@ def _with_poles_and_mode(
         if set(SHAPE) <= set(behind.names) and behind.cost < best.cost:
             best, without = behind, lagging
     if not is_settled(best) and np.isfinite(after_steps(best)):
-        tried = [_with_second_order(best, pieces, floors)]
-        if not _rings_as_a_whole(tried[0].model):
-            tried.append(_with_mode(_with_second_order(lagging, pieces, floors), pieces, floors))
-        second = min(tried, key=lambda f: f.cost)
-        if after_steps(second) < SECOND * after_steps(best):
+        tried = [_with_second_order(f, pieces, floors) for f in (best, lagging) if f.model[Arx.name].array("a").size]
+        tried = [f if ExtraResonance.name in f.model else _with_mode(f, pieces, floors) for f in tried]
+        slowest = max(SLOW, *(_slowest_pole(f.model) for f in (best, lagging)))
+        second = min((f for f in tried if not _slowest_pole(f.model) > slowest), key=lambda f: f.cost, default=best)
+        share = SECOND if set(SHAPE) <= set(second.names) else DESCRIBED
+        if after_steps(second) < share * after_steps(best):
             best, without = second, lagging
     return best, _lead(without, best)
 
@@ -167,10 +171,8 @@ def _with_pole(start: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[
 
 
 def _with_second_order(start: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
-    """The fit with ARX dynamics of second order."""
-    one = (1.0, -ADDED)
-    factor = one if start.model[Arx.name].array("a").size else np.convolve(one, one)
-    return fit_structure(_with_factor(start.model, factor), pieces, floors, held_by(start))
+    """The fit with ARX dynamics of second order instead of a pole."""
+    return fit_structure(_with_factor(start.model, (1.0, -ADDED)), pieces, floors, held_by(start))
 
 
 def _with_factor(model: Model, factor: Sequence[float] | Array) -> Model:
@@ -178,6 +180,12 @@ def _with_factor(model: Model, factor: Sequence[float] | Array) -> Model:
     arx = model[Arx.name]
     a, b = (np.convolve(c, factor).tolist() for c in ((1.0, *arx.array("a")), arx.array("b")))
     return model.with_effect(Arx(a=tuple(a[1:]), b=tuple(b), delay=arx["delay"]))
+
+
+def _slowest_pole(model: Model) -> float:
+    """The largest pole of the dynamics that is real and positive; 0 without any."""
+    poles = np.roots((1.0, *model[Arx.name].array("a")))
+    return max((float(p.real) for p in poles if p.imag == 0.0 and p.real > 0.0), default=0.0)
 
 
 def _rings_as_a_whole(model: Model) -> bool:
