@@ -1,0 +1,54 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A low-pass filter of the sensor hides the ringing of the stage after a step; mode and filter are found together."""
+
+import numpy as np
+import pytest
+
+from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from piezo_hysteresis.discrepancy.residual.residual import errors, zero_per_phase
+from piezo_hysteresis.effects import ExtraResonance
+from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.steps.remaining_lag import lag
+from piezo_hysteresis.record import Experiment
+
+PERIOD = 5e-4
+FILTERS = {
+    "pole": {"filter_pole": 3e-3},
+    "butterworth": {"filter_twice": 1e-3},
+    "mean": {"filter_mean": 1e-3},
+}
+
+
+def played(stage, *frequencies):
+    records = (stage.play(growing_sine(f, PERIOD, (0.4, 1.0)), PERIOD, f"sine_{f:g}hz") for f in frequencies)
+    return Experiment(tuple(records))
+
+
+@pytest.mark.parametrize("filtered", FILTERS.values(), ids=FILTERS)
+@pytest.mark.parametrize("fitted, judged", [((1.0, 60.0), 10.0), ((1.0, 10.0), 60.0)], ids=["between", "faster"])
+def test_a_filtered_stage_is_predicted_at_other_rates(filtered, fitted, judged):
+    stage = Nanopositioner(mode=400.0, **filtered)
+    found = identify(played(stage, *fitted), memory=True).model
+    assert found[ExtraResonance.name]["f0"] == pytest.approx(400.0, rel=0.02)
+    assert errors(found, played(stage, judged), zero_per_phase(found)).percent < 0.12
+
+
+def test_the_lag_of_one_rate_is_not_taken_for_creep():
+    """A slow pole, and a zero that nearly cancels it, would do what creep does, and leave the lag unknown."""
+    found = identify(played(Nanopositioner(), 10.0), memory=True)
+    assert lag(found.fit)[1] < 0.1 * PERIOD
+    poles = np.roots((1.0, *found.model["arx"].array("a")))
+    assert all(np.abs(p) < 0.8 for p in poles)
