@@ -46,7 +46,7 @@ from piezo_hysteresis.identification.identification import Identification
 from piezo_hysteresis.identification.identified_range import LAG_ERROR
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.steps.remaining_lag import error_of_lag, lag
-from piezo_hysteresis.identification.structure.linear_part import lag_of_mode, mode_is_inferred
+from piezo_hysteresis.identification.structure.mode import lag_of_mode, mode_is_inferred
 from piezo_hysteresis.record import Experiment
 
 PERIOD = 5e-4

@@ -34,7 +34,7 @@ from .steps.delay import Delay
 from .steps.dynamics import Dynamics
 from .steps.order_choice import OrderError
 from .steps.three_steps import ThreeSteps
-from .structure.linear_part import assumed_numbers
+from .structure.mode import assumed_numbers
 from .structure.structure_choice import StructureChoice
 
 CORRELATED = 0.95

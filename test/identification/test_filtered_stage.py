@@ -38,7 +38,7 @@ def played(stage, *frequencies):
 
 
 @pytest.mark.parametrize("filtered", FILTERS.values(), ids=FILTERS)
-@pytest.mark.parametrize("fitted, judged", [((1.0, 60.0), 10.0), ((1.0, 10.0), 60.0)], ids=["between", "faster"])
+@pytest.mark.parametrize(("fitted", "judged"), [((1.0, 60.0), 10.0), ((1.0, 10.0), 60.0)], ids=["between", "faster"])
 def test_a_filtered_stage_is_predicted_at_other_rates(filtered, fitted, judged):
     stage = Nanopositioner(mode=400.0, **filtered)
     found = identify(played(stage, *fitted), memory=True).model

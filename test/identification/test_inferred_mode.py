@@ -22,7 +22,7 @@ from piezo_hysteresis.cli.model.identify import answer
 from piezo_hysteresis.identification.identified_range import LAG_ERROR
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.steps.remaining_lag import error_of_lag, lag
-from piezo_hysteresis.identification.structure.linear_part import assumed_numbers, mode_is_inferred
+from piezo_hysteresis.identification.structure.mode import assumed_numbers, mode_is_inferred
 from piezo_hysteresis.record import Experiment
 from piezo_hysteresis.report.tables.parameter_table import parameter_table
 

@@ -26,10 +26,10 @@ from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.steps.remaining_lag import lag
 from piezo_hysteresis.identification.structure.left_out import score_left_out
-from piezo_hysteresis.identification.structure.linear_part import fit_structure
 from piezo_hysteresis.identification.structure.piece_fit import at_its_cost, best_step, fit_pieces, linearised
 from piezo_hysteresis.identification.structure.pieces import Kind, pieces_of
 from piezo_hysteresis.identification.structure.prior import WANDER, WANDER_TIME
+from piezo_hysteresis.identification.structure.structure_fit import fit_structure
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 

@@ -23,7 +23,7 @@ from ...effects import MEMORY, OPERATORS, PublishedBoucWen
 from ...identification.identification import Identification, undetermined
 from ...identification.identify import identify
 from ...identification.records.roles import HELD_OUT
-from ...identification.structure.linear_part import assumed_numbers
+from ...identification.structure.mode import assumed_numbers
 from ...model import model_file
 from ...model.axes_samples import has_several_drives
 from ...report.json_file import write_json

@@ -34,10 +34,10 @@ from ...errors import PiezoError
 from ...identification.fit.fit import Fit
 from ...identification.identification import Identification
 from ...identification.structure.left_out import score_left_out
-from ...identification.structure.linear_part import free_numbers
 from ...identification.structure.piece_fit import fit_pieces
 from ...identification.structure.pieces import pieces_of
 from ...identification.structure.structure_choice import LEADS
+from ...identification.structure.structure_fit import free_numbers
 from ...identification.structure.uncertainty import as_fit
 from ...model.model import Model
 from ...record import Record

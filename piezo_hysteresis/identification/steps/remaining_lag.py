@@ -24,7 +24,7 @@ from ...effects import Arx, ExtraResonance
 from ...record import Notice
 from ..fit.fit import Fit
 from ..records.excitation_content import ExcitationContent, moving
-from ..structure.linear_part import lag_of_mode, mode_is_inferred
+from ..structure.mode import lag_of_mode, mode_is_inferred
 from .linear_start import dynamics_of
 
 ONE_FREQUENCY = 4

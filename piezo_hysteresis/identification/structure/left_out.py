@@ -21,10 +21,10 @@ from collections.abc import Collection, Sequence
 from ...effects import Arx
 from ...model.model import Model
 from ...record import Record
-from .linear_part import free_numbers
 from .piece_fit import at_its_cost, linearised
 from .pieces import Kind, pieces_of
 from .scores import ModelStructure, judge
+from .structure_fit import free_numbers
 
 WHOLE = ModelStructure(True, 2, True)
 """The structure with all effects switched on."""

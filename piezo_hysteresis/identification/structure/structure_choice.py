@@ -17,7 +17,7 @@
 Relaxations and weights without bounds fit the data better, but their predictions are much worse. Therefore only
 bounded effects are offered: play operators with weights that are not negative, or the state of a hysteresis operator;
 the cube and the square of the drive; logarithmic creep with one rate or two; weights that depend on the level; a delay,
-one pole and one lightly damped mode, or ARX of higher order where a step shows it.
+one pole and one lightly damped mode, and ARX of higher order where a step shows it.
 """
 
 from __future__ import annotations
@@ -42,11 +42,13 @@ from ...model.model import Model
 from ...record import Notice, Record
 from ..fit.fit import Fit, Progress
 from ..records.conditioning import with_conditioning
-from .linear_part import fit_linear_part, fit_structure, held_by, mode_notices
+from .linear_part import fit_linear_part
+from .mode import held_by, mode_notices
 from .piece_fit import PieceFit
 from .pieces import Kind, RecordPiece, pieces_of
 from .scores import STRUCTURES, Judged, ModelStructure, judge
 from .step_weights import discounted_steps
+from .structure_fit import fit_structure
 from .uncertainty import as_fit, spread_of
 
 PLAYS = 16

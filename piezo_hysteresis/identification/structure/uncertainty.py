@@ -23,7 +23,7 @@ import numpy as np
 from ...effects import MEMORY, Creep
 from ...errors import IdentificationError
 from ..fit.fit import Fit
-from .linear_part import SHAPE, SHARE, lag_of_mode, mode_is_inferred
+from .mode import SHAPE, SHARE, lag_of_mode, mode_is_inferred
 from .piece_fit import DELAY, POLE, Array, PieceFit, free_directions
 from .pieces import Kind, RecordPiece
 from .prior import INDEPENDENT

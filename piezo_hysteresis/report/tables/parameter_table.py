@@ -21,7 +21,7 @@ import numpy as np
 from ...effects import Arx
 from ...identification.fit.fit import Fit
 from ...identification.identification import scale_note
-from ...identification.structure.linear_part import assumed_numbers
+from ...identification.structure.mode import assumed_numbers
 from ...model.model import Model
 from .table import Table
 
