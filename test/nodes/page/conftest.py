@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One browser for the tests of a file (skipped where there is none), and a lab with room for readers that are killed.
+"""One browser for the tests of a file (skipped where there is none), and a lab on the launch files' transports.
 
-A process reads the profile of its transports once, and each of its later labs has the same: so it has to be one that
-also reaches nodes without a profile, over shared memory alone.
+A process reads the profile of its transports once, and does not reach nodes that have another one. So the profile is
+kept for all later labs of the process, and without a browser, which skips these tests, it is not read.
 """
 
 import os
@@ -30,9 +30,9 @@ from .browser import CHROMIUM, Browser
 
 TRANSPORTS = {
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-    "FASTDDS_DEFAULT_PROFILES_FILE": str(Path(__file__).parents[3] / "config" / "large_blocks.xml"),
+    "FASTDDS_DEFAULT_PROFILES_FILE": str(Path(__file__).parents[3] / "config" / "launch_transports.xml"),
 }
-"""The shared memory of the launch files, without the network."""
+"""As the launch files set them, but for this machine only."""
 
 
 @pytest.fixture(scope="module")
@@ -47,13 +47,11 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="module")
-def shared_lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
-    """One lab for all tests of a file, with room for readers that are killed."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name, value in TRANSPORTS.items():
-            patch.setenv(name, value)
-        with opened(tmp_path_factory.mktemp("lab")) as lab:
-            yield lab
+def shared_lab(tmp_path_factory: pytest.TempPathFactory, browser: Browser) -> Iterator[Lab]:
+    """One lab for all tests of a file, on the transports of the launch files."""
+    os.environ.update(TRANSPORTS)
+    with opened(tmp_path_factory.mktemp("lab")) as lab:
+        yield lab
 
 
 @pytest.fixture
