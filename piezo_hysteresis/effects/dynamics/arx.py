@@ -84,10 +84,14 @@ class Arx(Effect):
             raise ParameterError(f"arx.a: unstable, got a pole of radius {radius:.6g}, expected all below 1")
 
     @property
+    def poles(self) -> Array:
+        """Poles of G in the z plane, shape (na,)."""
+        return np.roots(np.append(1.0, self.array("a"))).astype(complex)
+
+    @property
     def pole_radius(self) -> float:
         """Largest magnitude of a pole; 0 without poles."""
-        a = self.array("a")
-        return float(np.abs(np.roots(np.concatenate(([1.0], a)))).max()) if a.size else 0.0
+        return float(np.abs(self.poles).max(initial=0.0))
 
     @property
     def dc_gain(self) -> float:

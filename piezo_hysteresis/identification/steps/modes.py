@@ -119,7 +119,7 @@ def _found_at(
     if not slow:
         raise IdentificationError(f"modes: got no record of {SHORTEST * factor} samples")
     found = identify_arx(slow, max(1, round(delay / factor)), factor * sample_period, orders, iterations)
-    poles = np.roots(np.concatenate(([1.0], found.arx.array("a")))).astype(complex)
+    poles = found.arx.poles
     modes = poles[poles.imag > 0.0] ** (1.0 / factor)
     if not modes.size:
         raise IdentificationError(f"modes: got none at a rate lower by {factor}, expected a pair of poles")

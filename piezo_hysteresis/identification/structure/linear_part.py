@@ -22,6 +22,7 @@ import numpy as np
 
 from ...effects import Arx, ExtraResonance
 from ...model.model import Model
+from ..steps.linear_start import dynamics_of
 from .mode import SHAPE, SHARE, held_by, mode_is_inferred, rings_as_a_whole, with_mode
 from .piece_fit import DELAY, POLE, Array, PieceFit
 from .pieces import Kind, RecordPiece
@@ -148,8 +149,7 @@ def _with_factor(model: Model, factor: Sequence[float] | Array) -> Model:
 
 def _slowest_pole(model: Model) -> float:
     """The largest pole of the dynamics that is real and positive; 0 without any."""
-    poles = np.roots((1.0, *model[Arx.name].array("a")))
-    return max((float(p.real) for p in poles if p.imag == 0.0 and p.real > 0.0), default=0.0)
+    return max((float(p.real) for p in dynamics_of(model).poles if p.imag == 0.0 and p.real > 0.0), default=0.0)
 
 
 def _lead(without: PieceFit, found: PieceFit) -> float:

@@ -20,10 +20,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...effects import Arx, ExtraResonance
+from ...effects import ExtraResonance
 from ...model.model import Model
 from ...record import Notice
 from ..records.excitation_content import excitation_content
+from ..steps.linear_start import dynamics_of
 from .piece_fit import DELAY, PieceFit
 from .pieces import Kind, RecordPiece
 from .ringing import RESOLVED, SLOWEST, ringing_lines
@@ -116,7 +117,7 @@ def lag_of_mode(model: Model) -> dict[str, float]:
 def mode_notices(fit: PieceFit) -> list[Notice]:
     """``ringing`` with the numbers of the mode, if there is one; one that does not ring has the assumed damping."""
     if ExtraResonance.name not in fit.model:
-        poles = np.roots((1.0, *fit.model[Arx.name].array("a")))
+        poles = dynamics_of(fit.model).poles
         if not any(_damping(p) <= RINGS for p in poles):
             return []
         said = f"the stage rings after steps; ARX of order {poles.size} describes its samples better than a mode does"
@@ -137,5 +138,5 @@ def _damping(pole: complex) -> float:
     """Damping ratio of a pole of the samples; 1 for one that is real and positive, or 0."""
     if pole == 0.0:
         return 1.0
-    decay = np.log(complex(pole))
+    decay = np.log(pole)
     return float(-decay.real / abs(decay))

@@ -14,7 +14,7 @@
 
 """One browser for the tests of a file (skipped where there is none), and a lab on the launch files' transports.
 
-A process reads the profile of its transports once, and does not reach nodes that have another one. So the profile is
+A process reads the profile of its transports once, and may not reach nodes that have another one. So the profile is
 kept for all later labs of the process, and without a browser, which skips these tests, it is not read.
 """
 
