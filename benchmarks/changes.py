@@ -59,6 +59,9 @@ def changes(day: Nanopositioner) -> Iterator[tuple[str, str, float | None, Nanop
     for samples in (0.2, 2.0, 20.0):
         slow = replace(day, filter_pole=samples * PERIOD)
         yield f"pole {samples:g} samples", "lag", samples * PERIOD, slow
+    for samples in (0.2, 2.0, 20.0):
+        before = replace(day, filter_drive=samples * PERIOD)
+        yield f"pole before the hysteresis {samples:g} samples", "lag", samples * PERIOD, before
     for samples in (0.5, 2.0, 10.0):
         twice = replace(day, filter_twice=samples * PERIOD)
         yield f"second order {samples:g} samples", "lag", 2.0**0.5 * samples * PERIOD, twice

@@ -89,6 +89,7 @@ class Nanopositioner:
     noise: float = 2e-4
     zero: float = 1e-6
     gain: float = 1.0
+    filter_drive: float = 0.0
     filter_delay: float = 0.0
     filter_pole: float = 0.0
     filter_twice: float = 0.0
@@ -134,7 +135,7 @@ class Nanopositioner:
     def play(self, drive: Array, period: float, phase: str = "record") -> Record:
         """Record of a drive [V] that follows a rest at 0 V, sampled at `period` [s]."""
         dt = period / FINER
-        v = np.repeat(drive, FINER) / self.volt
+        v = self._late(np.repeat(drive, FINER) / self.volt, 0.0, self.filter_drive, dt)
         x = self._mechanics(self._creep(self._hysteresis(v), dt), dt)
         if self.softening:
             for _ in range(3):

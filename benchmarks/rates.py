@@ -21,13 +21,15 @@ that no error is promised at the fastest rate but the one that the stated uncert
 
 With `--voltage-noise`, the voltage of the records that are fitted was measured with white noise; the stage has not seen
 it, and the records that judge have none. With `--period`, the samples are farther apart, and the frequencies lower by
-as much: the mode then rings faster than the samples show. With `--filter`, the sensor has a filter: a pole of that time
-constant, a Butterworth low-pass of second order, or the mean of the last samples.
+as much: the mode then rings faster than the samples show. With `--filter_drive`, a pole of that time constant is before
+the hysteresis. With the other filters, it is behind the sensor: a pole, a Butterworth low-pass of second order, or the
+mean of the last samples, which is so much later.
 
     python -m benchmarks.rates --stages 6
     python -m benchmarks.rates --stages 6 --voltage-noise 0.01
     python -m benchmarks.rates --stages 6 --period 0.005
-    python -m benchmarks.rates --stages 6 --filter twice 0.001
+    python -m benchmarks.rates --stages 6 --filter_drive 0.001
+    python -m benchmarks.rates --stages 6 --filter_twice 0.001
 """
 
 from __future__ import annotations
@@ -59,6 +61,13 @@ LEVELS = (0.2, 0.4, 0.6, 0.8, 1.0)
 """Amplitudes of the sines, shares of the largest."""
 SMALL = 3
 """Levels that are fitted where the largest are left out."""
+FILTERS = {
+    "filter_drive": "time constant of a pole before the hysteresis",
+    "filter_pole": "time constant of a pole behind the sensor",
+    "filter_twice": "time constant of a Butterworth low-pass of second order behind the sensor",
+    "filter_mean": "delay of a moving average behind the sensor",
+}
+"""Options for a low-pass in the chain, and what their number is."""
 Values = tuple[float, ...]
 """Frequencies [Hz], or levels."""
 PROMISED = {
@@ -109,7 +118,7 @@ def lag_holds(found: Identification, stage: Nanopositioner, period: float = PERI
     value, error = lag(found.fit)
     model = found.model
     if ExtraResonance.name in model and not mode_is_inferred(model):  # that of an inferred mode is part of the lag
-        value += lag_of_mode(model)["lag"] * model.sample_period
+        value += lag_of_mode(model)
     return abs(value - stage.sampled_lag(period)) < 1.96 * error
 
 
@@ -119,9 +128,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first stage")
     parser.add_argument("--period", type=float, default=PERIOD, help="sample period [s]")
     parser.add_argument("--voltage-noise", type=float, default=0.0, help="of the fitted records [V]")
-    parser.add_argument(
-        "--filter", nargs=2, metavar=("KIND", "TIME"), help="pole, twice or mean; time constant, or mean delay [s]"
-    )
+    for name, help in FILTERS.items():
+        parser.add_argument(f"--{name}", type=float, default=0.0, metavar="TIME", help=f"{help} [s]")
 
 
 def run(options: argparse.Namespace) -> list[Figures]:
@@ -130,7 +138,7 @@ def run(options: argparse.Namespace) -> list[Figures]:
     one_rate: list[tuple[float, float, bool]] = []
     period = options.period
     low, middle, high = (f * PERIOD / period for f in FREQUENCIES)
-    filtered = {f"filter_{options.filter[0]}": float(options.filter[1])} if options.filter else {}
+    filtered = {name: getattr(options, name) for name in FILTERS}
     for seed in range(options.first, options.first + options.stages):
         rng = np.random.default_rng(seed)
         stage = Nanopositioner.random(rng, mode=float(rng.uniform(250.0, 800.0)), **filtered)

@@ -24,7 +24,7 @@ from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy import Conclusion, Diagnosis, Verdict, diagnose
 from piezo_hysteresis.discrepancy.changes.parameter_changes import find_change, is_unchanged
 from piezo_hysteresis.discrepancy.changes.recalibration import recalibrate
-from piezo_hysteresis.discrepancy.changes.same_stage import sentence_of
+from piezo_hysteresis.discrepancy.changes.same_stage import changed_model, sentence_of
 from piezo_hysteresis.discrepancy.diagnose import compared_with_given
 from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
 from piezo_hysteresis.discrepancy.passes import compare_with_given_model, prepare
@@ -32,6 +32,7 @@ from piezo_hysteresis.discrepancy.residual.noise_floor import floors
 from piezo_hysteresis.discrepancy.residual.residual import errors, zero_per_phase
 from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.steps.remaining_lag import amplifier_of
 from piezo_hysteresis.model.provenance import data_hash
 from piezo_hysteresis.record import Experiment
 from piezo_hysteresis.report.figures.comparison import compare_diagnosis
@@ -77,6 +78,7 @@ def test_a_delay_is_found_with_its_size(model, another_day, samples):
     ("changed", "key", "size"),
     [
         ({"filter_pole": 2e-3}, "low_pass", 2e-3),
+        ({"filter_drive": 2e-3}, "low_pass_before", 2e-3),
         ({"filter_twice": 2e-3}, "low_pass_2", 2e-3),
         ({"softening": 0.03}, "softening", 0.03),
         ({"gain": 1.06}, "gain", 0.06),
@@ -100,6 +102,17 @@ def test_the_changed_parameter_is_named(model, another_day, changed, key, size):
 )
 def test_a_large_change_is_named_although_its_form_is_not_exact(model, another_day, changed, key):
     assert change_of(model, replace(another_day, **changed)).key == key
+
+
+def test_an_amplifier_that_became_slower_is_found_with_its_size():
+    stage = Nanopositioner(mode=310.0, filter_drive=1e-3)
+    before = identify(played(stage), memory=True).model
+    assert amplifier_of(before)["tau"] == pytest.approx(1e-3, rel=0.05)
+    change = change_of(before, replace(stage, noise_seed=1, filter_drive=3e-3))
+    assert change.key == "low_pass_before"
+    assert change.interval_95[0] <= 2e-3 <= change.interval_95[1]
+    records = played(replace(stage, noise_seed=1, filter_drive=3e-3)).records
+    assert amplifier_of(changed_model(before, change, records))["tau"] == pytest.approx(3e-3, rel=0.02)
 
 
 @pytest.mark.parametrize("late", [5e-4, 1e-3, 4e-3])

@@ -12,19 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A low-pass filter of the sensor hides the ringing of the stage after a step; mode and filter are found together."""
+"""A low-pass filter in the chain hides the ringing of the stage after a step; mode and filter are found together."""
 
 import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from benchmarks.rates import lag_holds
 from piezo_hysteresis.discrepancy.residual.residual import errors, zero_per_phase
 from piezo_hysteresis.effects import ExtraResonance
 from piezo_hysteresis.identification.identify import identify
-from piezo_hysteresis.identification.steps.remaining_lag import lag
+from piezo_hysteresis.identification.steps.remaining_lag import amplifier_of, lag
 from piezo_hysteresis.record import Experiment
 
 PERIOD = 5e-4
 FILTERS = {
+    "drive": {"filter_drive": 2e-3},
     "pole": {"filter_pole": 3e-3},
     "butterworth": {"filter_twice": 1e-3},
     "mean": {"filter_mean": 1e-3},
@@ -43,6 +45,28 @@ def test_a_filtered_stage_is_predicted_at_other_rates(filtered, fitted, judged):
     found = identify(played(stage, *fitted), memory=True).model
     assert found[ExtraResonance.name]["f0"] == pytest.approx(400.0, rel=0.02)
     assert errors(found, played(stage, judged), zero_per_phase(found)).percent < 0.12
+
+
+@pytest.mark.parametrize("late", [6e-4, 2e-3])
+@pytest.mark.parametrize("place", ["filter_drive", "filter_pole"])
+def test_a_pole_is_found_where_it_is(place, late):
+    stage = Nanopositioner(mode=400.0, pole=2e-5, **{place: late})
+    found = identify(played(stage, 1.0, 60.0), memory=True)
+    amplifier = amplifier_of(found.model)
+    assert (amplifier is not None) == (place == "filter_drive")
+    assert ("amplifier" in {n.kind for n in found.notices}) == (amplifier is not None)
+    if amplifier:
+        assert amplifier["tau"] == pytest.approx(late, rel=0.05)
+    assert lag_holds(found, stage, PERIOD)
+
+
+def test_one_slow_rate_does_not_tell_where_the_pole_is():
+    """The lag depends on the place, so its interval holds both."""
+    stage = Nanopositioner(mode=400.0, filter_drive=1e-3)
+    found = identify(played(stage, 1.0), memory=True)
+    assert lag_holds(found, stage, PERIOD)
+    settled = identify(played(stage, 1.0, 10.0, 60.0), memory=True)
+    assert lag(found.fit)[1] > 2.0 * lag(settled.fit)[1]
 
 
 def test_the_lag_of_one_rate_is_not_taken_for_creep():

@@ -29,6 +29,7 @@ from piezo_hysteresis.discrepancy import Verdict, diagnose
 from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.effects import ThermalDrift
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.steps.remaining_lag import amplifier_of
 
 SETTLED = 1000
 
@@ -75,7 +76,7 @@ def test_plays_foretell_other_amplitudes(identified, fitted, unseen):
     assert "hysteresis_memory" in identified.model
     assert identified.model["hysteresis_memory"].array("c").min() >= 0.0
     assert settled_percent(identified.model, fitted) <= 0.25
-    assert errors(identified.model, unseen).percent <= 0.55
+    assert errors(identified.model, unseen).percent <= 0.5
 
 
 def test_the_bouc_wen_state_does_not(fitted, unseen, identified):
@@ -85,9 +86,8 @@ def test_the_bouc_wen_state_does_not(fitted, unseen, identified):
 
 
 def test_delay_and_pole_come_from_the_first_moments(identified):
-    arx, period = identified.model["arx"], identified.model.sample_period
-    assert 1.0 <= arx["delay"] <= 2.0
-    assert -period / np.log(-arx.array("a")[0]) == pytest.approx(13e-3, abs=2e-3)
+    assert identified.model["arx"]["delay"] == pytest.approx(1.0, abs=0.3)
+    assert amplifier_of(identified.model)["tau"] == pytest.approx(13e-3, abs=2e-3)
 
 
 def test_drift_in_addition_to_creep_does_not_increase_the_error(fitted, unseen):

@@ -21,7 +21,16 @@ from typing import Any
 
 import numpy as np
 
-from ...effects import Creep, ExtraDelay, ExtraResonance, SecondOrderLowPass, SensorBandwidth, Softening, ThermalDrift
+from ...effects import (
+    AmplifierBandwidth,
+    Creep,
+    ExtraDelay,
+    ExtraResonance,
+    SecondOrderLowPass,
+    SensorBandwidth,
+    Softening,
+    ThermalDrift,
+)
 from ...effects.sensor.second_order_low_pass import BUTTERWORTH
 
 BESSEL = 0.75**0.5
@@ -69,13 +78,21 @@ class ChangeKind:
     @property
     def is_filter(self) -> bool:
         """Whether the size is the time constant of a filter."""
-        return self.name in (SensorBandwidth.name, SecondOrderLowPass.name)
+        return self.name in (SensorBandwidth.name, SecondOrderLowPass.name, AmplifierBandwidth.name)
 
 
 KINDS: dict[str, ChangeKind] = {
     "delay": ChangeKind(ExtraDelay.name, "lag", "tau", "s", (), "its response is {how} by {size}"),
     "low_pass": ChangeKind(
         SensorBandwidth.name, "lag", "tau", "s", (), "a low-pass with time constant {size} follows it"
+    ),
+    "low_pass_before": ChangeKind(
+        AmplifierBandwidth.name,
+        "lag",
+        "tau",
+        "s",
+        ("low_pass_before",),
+        "a low-pass with time constant {size} precedes its hysteresis",
     ),
     **{
         key: ChangeKind(

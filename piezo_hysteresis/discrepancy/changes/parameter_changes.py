@@ -22,17 +22,18 @@ small changes leave. Other changes that explain as much are its rivals.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import ExtraResonance, Softening
+from ...effects import Softening
 from ...model.model import Model
 from ...record import Record
 from ..search.cross_validation import ADEQUATE
 from .change_kinds import KINDS, LEAVES, ParameterChange
 from .change_search import DAY_TO_DAY, FARTHEST, Account, ChangeSearch
+from .explanation import UNCERTAIN, Explanation, low_pass_before, moved_resonance
 from .signatures import AVERAGE, SECOND_ORDER, SHAPES, shaped_model
 
 Array = NDArray[np.float64]
@@ -48,12 +49,6 @@ SEEN = 0.7
 """Smallest size of a reported change, RMS in floors."""
 RIVAL = 1.15
 """Largest ratio of V for which another change counts as explaining as much."""
-MOVED = (0.75, 0.8, 0.85, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1, 1.15, 1.2, 1.27, 1.35)
-"""Start values of the search for a shifted resonance, relative to its frequency."""
-TURNS = 4
-"""Number of linearisations of that search."""
-UNCERTAIN = 0.6
-"""Share of the remaining error that can resemble a change. The remaining error counts at least as the floor."""
 FORMS = 6.0
 """Largest ratio of V for which the lag of another form counts in the interval. Up to it, another form is a rival if V
 remains above `LEAVES`: what remains is then an error of the form."""
@@ -93,17 +88,20 @@ def find_change(
     if _is_known(search, day, floors):
         return None
     keys = [k for k, kind in KINDS.items() if k in SHAPES or (kind.rows and kind.rows[0] in search.predicted[0].rows)]
-    first = [k for k in (*search.sides, *keys) if k not in SECOND_ORDER]
+    first = [k for k in (*search.sides, *keys) if k not in (*SECOND_ORDER, "low_pass_before")]
     accounts = []
     for done, key in enumerate(first):
         progress(done / (len(first) + 1))
         accounts.append(search.best(key))
     progress(len(first) / (len(first) + 1))
     accounts += _filters_of_second_order(search)
-    found = [_Explanation(search, a) for a in accounts]
+    found = [Explanation(search, a) for a in accounts]
     if "resonance" in keys and min(e.account.cost for e in found) > LEAVES:
-        found.append(_moved_resonance(model, records, used, floors))
+        found.append(moved_resonance(model, records, used, floors))
     least = min(e.account.cost for e in found)
+    lagging = next(e for e in found if e.account.key == "low_pass")
+    if _may_be(lagging, least) and lagging.size > 0.0:
+        found.append(low_pass_before(model, records, used, floors, lagging.size))
     found = [_simulated(e, model, records, used, floors) if _may_be(e, least) else e for e in found]
     # at similar cost, a delay or a filter of first order comes before one of second order
     found.sort(key=lambda e: e.account.cost * (RIVAL if e.account.key in SECOND_ORDER else 1.0))
@@ -129,7 +127,7 @@ def find_change(
     return ParameterChange(best.key, size, interval, rivals, day.cost, best.left, search.session(best), also)
 
 
-def _may_be(found: _Explanation, least: float) -> bool:
+def _may_be(found: Explanation, least: float) -> bool:
     """Whether a lag may be the change, so that it is worth an exact simulation."""
     return found.account.key in SHAPES and found.account.cost < FORMS * max(1.0, least)
 
@@ -176,28 +174,9 @@ def _filters_of_second_order(search: ChangeSearch) -> list[Account]:
     return [best, *(search.best(key, near=best.size * zeta / other) for key, other in others)]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Explanation:
-    """An account, and the search with the model around which it is linearised."""
-
-    search: ChangeSearch
-    account: Account
-    moved: float = 0.0
-
-    @property
-    def size(self) -> float:
-        """Size of the change, in the unit of its kind."""
-        return self.moved + self.account.size
-
-    def alike(self, before: float) -> float:
-        """Half interval of the size due to the remaining error; `before` is V without the change."""
-        left = max(1.0, self.account.cost)
-        return UNCERTAIN * abs(self.size) * float(np.sqrt(left / max(before - self.account.cost, 1e-12)))
-
-
 def _simulated(
-    found: _Explanation, model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]
-) -> _Explanation:
+    found: Explanation, model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]
+) -> Explanation:
     """A delay or a filter, with the residual that remains when the model simulates it.
 
     An interpolated prediction leaves a larger residual if a stage rings within a few samples. Its size is more certain,
@@ -212,41 +191,20 @@ def _simulated(
     return replace(found, account=replace(found.account, cost=least.cost, left=least.left))
 
 
-def _spread_of_forms(found: Sequence[_Explanation]) -> float:
+def _spread_of_forms(found: Sequence[Explanation]) -> float:
     """Largest difference to the lag of another form, in the unit of the first explanation.
 
     Samples hardly show which form a lag of about a sample has.
     """
-    best, unit = found[0], KINDS[found[0].account.key].lag if found[0].account.key in SHAPES else 0.0
+    best, unit = found[0], KINDS[found[0].account.key].lag
     if not unit:
         return 0.0
     most = FORMS * max(1.0, best.account.cost)
-    forms = [(e.account.cost, e.size * KINDS[e.account.key].lag) for e in found[1:] if e.account.key in SHAPES]
+    forms = [(e.account.cost, e.size * KINDS[e.account.key].lag) for e in found[1:] if KINDS[e.account.key].lag]
     if best.account.key in SECOND_ORDER:
         mean = best.search.shaped(AVERAGE, near=unit * best.size)
         forms.append((mean.cost, mean.size))
     return max((abs(lag / unit - best.size) for cost, lag in forms if cost < most), default=0.0)
-
-
-def _moved_resonance(
-    model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]
-) -> _Explanation:
-    """The resonance at another frequency. The change is linear only near the solution, so the search iterates."""
-    name = f"{ExtraResonance.name}.f0"
-    before = model.values()[name]
-    lowest, highest = 0.5 * before, 2.0 * before
-
-    def about(frequency: float) -> _Explanation:
-        search = ChangeSearch(model.with_values({name: frequency}), records, used, floors)
-        return _Explanation(search, search.best("resonance"), frequency - before)
-
-    best = min((about(share * before) for share in MOVED), key=lambda e: e.account.cost)
-    for _ in range(TURNS):
-        again = about(float(np.clip(before + best.size, lowest, highest)))
-        if again.account.cost >= best.account.cost:
-            break
-        best = again
-    return best
 
 
 def _is_sure(size: float, half: float) -> bool:

@@ -34,7 +34,7 @@ from ..residual.localise import located
 from ..residual.noise_floor import floors, noise_floors, stroke
 from .change_kinds import KINDS, LEAVES, ParameterChange
 from .parameter_changes import find_change, is_unchanged
-from .signatures import DRIFT_TIME, SHAPES, creep_numbers, loop_numbers, shaped_model
+from .signatures import DRIFT_TIME, creep_numbers, loop_numbers, shaped_model
 
 ERROR, HASH = "free_run_error", "data_hash"
 """Keys of the provenance."""
@@ -151,7 +151,7 @@ def changed_model(model: Model, change: ParameterChange, records: Sequence[Recor
     values = model.values()
     gain, loop = change.session.get("gain", 0.0), change.session.get("loop", 0.0)
     numbers = {n: v * (1.0 + loop) for n, v in loop_numbers(model).items()} if loop else {}
-    if change.key in SHAPES:
+    if change.kind.family == "lag":
         model = shaped_model(model, change.key, change.size)
     elif change.kind.name == ExtraResonance.name:
         name = f"{ExtraResonance.name}.f0"

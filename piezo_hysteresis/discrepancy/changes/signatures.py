@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects import (
+    AmplifierBandwidthHeld,
     Arx,
     Creep,
     CreepFractional,
@@ -39,6 +40,7 @@ from ...effects import (
     Softening,
 )
 from ...errors import DivergenceError
+from ...identification.steps.remaining_lag import amplifier_of
 from ...model.chain import RUNAWAY
 from ...model.model import Model
 from ...record import Record
@@ -49,6 +51,8 @@ Array = NDArray[np.float64]
 
 AVERAGE = "moving_average"
 """A mean of the last samples; not a change that is named, because it resembles a Bessel filter of the same delay."""
+STEP = 1e-3
+"""Step of the derivative of the lag of an amplifier by its time constant [samples]."""
 DRIFT_TIME = 3.0
 """Time constant of a drift over the length of the longest record: the drift within a record is almost linear."""
 
@@ -103,8 +107,8 @@ def predictions(model: Model, records: Sequence[Record]) -> tuple[list[Changeabl
     """Free run of every record with its derivatives by the linear changes; share of the loop in the displacement.
 
     A change of the loop height does not change the gain, because that share of the displacement is subtracted.
-    The changes are ``gain``, ``loop`` and ``creep``, relative; ``resonance`` in Hz; ``softening`` per cube of the
-    range; ``drift`` in m at the end of the longest record.
+    The changes are ``gain``, ``loop`` and ``creep``, relative; ``resonance`` in Hz; ``low_pass_before`` in s;
+    ``softening`` per cube of the range; ``drift`` in m at the end of the longest record.
 
     Raises
     ------
@@ -114,7 +118,8 @@ def predictions(model: Model, records: Sequence[Record]) -> tuple[list[Changeabl
     bare = model.without(Offset.name) if Offset.name in model else model
     loop, creep = loop_numbers(bare), creep_numbers(bare)
     resonance = [f"{ExtraResonance.name}.f0"] if ExtraResonance.name in bare else []
-    wanted = [*loop, *creep, *resonance]
+    before_loop = _slopes_of_amplifier(bare)
+    wanted = [*loop, *creep, *resonance, *before_loop]
     span = max(float(np.ptp(r.displacement)) for r in records)
     longest = max(r.duration for r in records)
     parts: dict[int, tuple[list[Array], list[Array]]] = {}
@@ -140,12 +145,28 @@ def predictions(model: Model, records: Sequence[Record]) -> tuple[list[Changeabl
                 by[name] = sum((numbers[n] * slopes[order.index(n)] for n in numbers), np.zeros(y.size))
         if resonance:
             by["resonance"] = slopes[order.index(resonance[0])]
+        if before_loop:
+            by["low_pass_before"] = sum((s * slopes[order.index(n)] for n, s in before_loop.items()), np.zeros(y.size))
         by[Softening.name] = -((y / span) ** 3) * span
         time = record.start_time + record.sample_period * np.arange(y.size)
         by["drift"] = np.expm1(-time / (DRIFT_TIME * longest)) / np.expm1(-1.0 / DRIFT_TIME)
         found.append(ChangeablePrediction(record, y, before, by))
         before = float(y[-1])
     return found, _loop_apart(found)
+
+
+def _slopes_of_amplifier(model: Model) -> dict[str, float]:
+    """Changes of the parameters if an amplifier is slower by 1 s, as in `shaped_model`; none without an amplifier."""
+    amplifier = amplifier_of(model)
+    if amplifier is None:
+        return {}
+    found = {f"{amplifier.name}.tau": 1.0}
+    if Arx.name in model:
+        step = STEP * model.sample_period
+        slower = amplifier.with_values(tau=amplifier["tau"] + step)
+        late = 1.0 - (slower.lag(model.sample_period) - amplifier.lag(model.sample_period)) / step
+        found[f"{Arx.name}.delay"] = late / model.sample_period
+    return found
 
 
 def _loop_apart(found: Sequence[ChangeablePrediction]) -> float:
@@ -208,7 +229,13 @@ SHAPES: dict[str, Shaped] = {
 
 
 def shaped_model(model: Model, key: str, size: float) -> Model:
-    """The model with a change of `SHAPES`: later by `size` [s], or behind a low-pass of that time constant [s]."""
+    """The model with a lag: later by `size` [s], or with a low-pass of that time constant [s]."""
+    if key == "low_pass_before":
+        old = amplifier_of(model) or AmplifierBandwidthHeld()
+        new = old.with_values(tau=old["tau"] + size)
+        # the hold of the converter stays a delay of the stage
+        held = size - (new.lag(model.sample_period) - old.lag(model.sample_period))
+        return shaped_model(model.with_effect(new), "delay", held)
     if KINDS[key].is_filter:
         name = KINDS[key].name
         tau = size + (model[name]["tau"] if name in model else 0.0)

@@ -48,12 +48,16 @@ class AmplifierBandwidth(Effect):
         "from the other lags"
     )
     source = "R·C of amplifier and actuator, 15–60 µs"
-    parameters = (Parameter("tau", "τ", "s", 0.0, 0.0, 1e-2, "time constant R·C", "R·C", 0.0, 2e-5),)
+    parameters = (Parameter("tau", "τ", "s", 0.0, 0.0, 1e-1, "time constant R·C", "R·C", 0.0, 2e-5),)
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         """Off, and several sizes, because the system after the pole is not linear."""
         return cls(), *(cls(tau=tau) for tau in START_VALUES)
+
+    def lag(self, sample_period: float) -> float:
+        """Time by which samples of a slow signal are later behind the pole [s]."""
+        return self["tau"]
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return LowPassBlock("amplifier_bandwidth.tau", linear_step(self["tau"], setting.sample_period))

@@ -20,7 +20,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...effects import Arx, ExtraResonance
+from ...effects import AmplifierBandwidth, AmplifierBandwidthHeld, Arx, ExtraResonance
+from ...model.model import Model
 from ...record import Notice
 from ..fit.fit import Fit
 from ..records.excitation_content import ExcitationContent, moving
@@ -29,21 +30,22 @@ from .linear_start import dynamics_of
 
 ONE_FREQUENCY = 4
 """Largest number of spectral lines of a drive with one frequency."""
+LATE = (Arx.name, AmplifierBandwidth.name, AmplifierBandwidthHeld.name)
+"""Effects whose lag is stated."""
 STATED = 0.01
 """Error, as a share of the range of a sine, for which the notice states the frequency."""
 
 
 def lag(fit: Fit) -> tuple[float, float]:
-    """Group delay of G at low frequency and its standard error [s], from the covariance of its coefficients.
+    """Lag of G and of the amplifier at low frequency and its standard error [s], from the covariance of the fit.
 
     The lag of an inferred mode is part of it, because the data determine only both together.
     """
-    names = [n for n in fit.names if n.startswith(f"{Arx.name}.")]
+    names = [n for n in fit.names if n.partition(".")[0] in LATE]
 
     def at(values: dict[str, float]) -> float:
         model = fit.model.with_values(values)
-        samples = dynamics_of(model).group_delay + (lag_of_mode(model)["lag"] if mode_is_inferred(model) else 0.0)
-        return samples * model.sample_period
+        return lag_beside_mode(model) + (lag_of_mode(model) if mode_is_inferred(model) else 0.0)
 
     steps = {n: max(1e-6 * abs(fit.values[n]), 1e-12) for n in names}
     value = at({})
@@ -51,6 +53,17 @@ def lag(fit: Fit) -> tuple[float, float]:
     rows = [fit.names.index(n) for n in names]
     variance = float(slopes @ fit.covariance[np.ix_(rows, rows)] @ slopes) if names else 0.0
     return value, float(np.sqrt(max(variance, 0.0)))
+
+
+def lag_beside_mode(model: Model) -> float:
+    """Group delay of G and of an amplifier before the hysteresis at low frequency [s]."""
+    period, amplifier = model.sample_period, amplifier_of(model)
+    return dynamics_of(model).group_delay * period + (amplifier.lag(period) if amplifier else 0.0)
+
+
+def amplifier_of(model: Model) -> AmplifierBandwidth | None:
+    """The low-pass before the hysteresis, of either form; None without one."""
+    return next((e for e in model.effects if isinstance(e, AmplifierBandwidth)), None)
 
 
 def error_of_lag(late: float, frequency: float) -> float:

@@ -26,6 +26,7 @@ from ..steps.linear_start import dynamics_of
 from .mode import SHAPE, SHARE, held_by, mode_is_inferred, rings_as_a_whole, with_mode
 from .piece_fit import DELAY, POLE, Array, PieceFit
 from .pieces import Kind, RecordPiece
+from .pole_place import LinearPart, in_every_place
 from .ringing import decay_after_steps, sampled_decay
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
 from .structure_fit import fit_structure, misfit_of
@@ -53,9 +54,7 @@ CONTRADICTED = 0.5
 """Largest ratio of the mean square misfits of all other motion without and with the steps if these contradict it."""
 
 
-def fit_linear_part(
-    model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]
-) -> tuple[PieceFit, float, float]:
+def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> LinearPart:
     """Fit a delay, and if they help: a mode, a pole or dynamics of second order, two more orders.
 
     Parameters
@@ -66,27 +65,19 @@ def fit_linear_part(
         Pieces in order.
     floors : sequence of float
         Floor of every record [m].
-
-    Returns
-    -------
-    fit : PieceFit
-        Fit of all free parameters.
-    lead : float
-        ln of the factor by which a ringing mode lowers the cost; 0 without such a mode.
-    late : float
-        How much later the steps come than all other motion says, if they contradict it [samples]; otherwise 0.
     """
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in LAGS]
     plain = min(found, key=lambda f: f.cost)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
+    best, *others = in_every_place(best, pieces, floors)
     fast = _with_two_more_orders(plain, best, pieces, floors)
     if fast is not best:
-        return fast, 0.0, 0.0
+        return LinearPart(fast, 0.0)
     apart = without_steps(pieces)
     other = fit_structure(best.model, apart, floors, (*held_by(best), *SHAPE, SHARE)) if apart else best
     if misfit_beside_steps(other, pieces) < CONTRADICTED * misfit_beside_steps(best, pieces):
-        return other, lead, lateness_of_steps(other, pieces)
-    return best, lead, 0.0
+        return LinearPart(other, lead, late=lateness_of_steps(other, pieces))
+    return LinearPart(best, lead, others)
 
 
 def _with_poles_and_mode(

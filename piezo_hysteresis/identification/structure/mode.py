@@ -107,11 +107,12 @@ def assumed_numbers(model: Model) -> tuple[str, ...]:
     return (*SHAPE, SHARE, DELAY) if mode_is_inferred(model) else ()
 
 
-def lag_of_mode(model: Model) -> dict[str, float]:
-    """By how much later a mode makes slow signals [samples], as ``lag``, and its derivatives by ``r`` and ``f0``."""
+def lag_of_mode(model: Model) -> float:
+    """By how much later a mode makes slow signals [s]; 0 without a mode."""
+    if ExtraResonance.name not in model:
+        return 0.0
     mode = model[ExtraResonance.name]
-    by_share = mode["zeta"] / (np.pi * mode["f0"] * model.sample_period)
-    return {"lag": mode["r"] * by_share, "r": by_share, "f0": -mode["r"] * by_share / mode["f0"]}
+    return mode["r"] * mode["zeta"] / (np.pi * mode["f0"])
 
 
 def mode_notices(fit: PieceFit) -> list[Notice]:

@@ -43,7 +43,7 @@ from ...record import Notice, Record
 from ..fit.fit import Fit, Progress
 from ..records.conditioning import with_conditioning
 from .linear_part import fit_linear_part
-from .mode import held_by, mode_notices
+from .mode import held_by
 from .piece_fit import PieceFit
 from .pieces import Kind, RecordPiece, pieces_of
 from .scores import STRUCTURES, Judged, ModelStructure, judge
@@ -59,8 +59,6 @@ START_CREEP = 0.005
 """Creep per decade of time at which a fit starts."""
 DISCOUNTS = 2
 """Number of times that the weights of steps are adapted to their misfit; the first fit takes part of it up."""
-LATE = 0.1
-"""Difference between the lags of steps and of other motion that is told [samples]."""
 TIE = 0.02
 """Difference of scores (mean ln R²) within which the structure with fewer parameters is chosen."""
 CREEPS = (Creep.name, CreepTwoRates.name)
@@ -87,7 +85,7 @@ class StructureChoice:
         one, if there are structures without it. If the state of the operator was kept, all of them are structures with
         the operator.
     notices : tuple of Notice
-        ``structure``, ``memory``, ``ringing``, ``step_time``.
+        ``structure``, ``memory``, ``ringing``, ``amplifier``, ``step_time``.
     """
 
     fit: Fit
@@ -118,7 +116,8 @@ def choose_structure(
     used, sizes = [records[i] for i in kept], [floors[i] for i in kept]
     pieces = pieces_of(used, [k for k, i in enumerate(kept) if i in fitted])
     progress("structure: lag", 0.1)
-    full, ringing, late = fit_linear_part(_with_plays(start, used), pieces, sizes)
+    linear = fit_linear_part(_with_plays(start, used), pieces, sizes)
+    full = linear.fit
     progress("structure: effects", 0.4)
     held = held_by(full)
     for _ in range(DISCOUNTS):
@@ -134,11 +133,7 @@ def choose_structure(
     progress("structure: rival", 0.85)
     described = "; ".join(f"{_words(j.structure)} {np.exp(0.5 * j.score):.3g}" for j in judged[:3])
     rival, lead = _rival(start, final, pieces, sizes)
-    notices = mode_notices(rival or final)
-    if abs(late) > LATE:
-        later = "later" if late > 0.0 else "earlier"
-        said = f"the steps come {later} than all other motion, as if the drive did not jump at a sample"
-        notices.append(Notice("step_time", f"{said}; the lag is that of the other motion"))
+    notices = linear.notices(rival or final)
     notices.append(
         Notice(
             "structure",
@@ -150,12 +145,14 @@ def choose_structure(
         message = f"{start.hysteresis.name} predicts data left out better by a factor of {np.exp(0.5 * lead):.3g}"
         notices.append(Notice("memory", f"{message}, so it is used instead of plays"))
         nothing = np.zeros((len(rival.names),) * 2)
-        leads = {ExtraResonance.name: ringing, **_leads_of_operator(start, full, chosen, pieces, sizes)}
-        return StructureChoice(as_fit(rival, pieces, sizes, nothing), tuple(judged), leads, tuple(notices))
+        leads = {ExtraResonance.name: linear.lead, **_leads_of_operator(start, full, chosen, pieces, sizes)}
+        fit = as_fit(rival, pieces, sizes, nothing, linear.open_lag)
+        return StructureChoice(fit, tuple(judged), leads, tuple(notices))
     notices.append(Notice("memory", f"{MEMORY.name} is used: the stage remembers its turning points"))
     spread = spread_of(full, final, chosen, judged)
-    leads = {MEMORY.name: -lead, ExtraResonance.name: ringing, **_leads(chosen, judged)}
-    return StructureChoice(as_fit(final, pieces, sizes, spread), tuple(judged), leads, tuple(notices))
+    leads = {MEMORY.name: -lead, ExtraResonance.name: linear.lead, **_leads(chosen, judged)}
+    fit = as_fit(final, pieces, sizes, spread, linear.open_lag)
+    return StructureChoice(fit, tuple(judged), leads, tuple(notices))
 
 
 def _leads(chosen: Judged, judged: Sequence[Judged]) -> dict[str, float]:

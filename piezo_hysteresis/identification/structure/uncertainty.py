@@ -20,10 +20,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...effects import MEMORY, Creep
+from ...effects import MEMORY, Creep, ExtraResonance
 from ...errors import IdentificationError
 from ..fit.fit import Fit
-from .mode import SHAPE, SHARE, lag_of_mode, mode_is_inferred
+from ..steps.remaining_lag import amplifier_of
+from .mode import SHAPE, SHARE, mode_is_inferred
 from .piece_fit import DELAY, POLE, Array, PieceFit, free_directions
 from .pieces import Kind, RecordPiece
 from .prior import INDEPENDENT
@@ -62,8 +63,16 @@ def spread_of(full: PieceFit, final: PieceFit, chosen: Judged, judged: Sequence[
     return picked
 
 
-def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float], spread: Array) -> Fit:
+def as_fit(
+    found: PieceFit,
+    pieces: Sequence[RecordPiece],
+    floors: Sequence[float],
+    spread: Array,
+    open_lag: float = 0.0,
+) -> Fit:
     """The fit to pieces as a `Fit`; the variance from the residual is added to `spread`.
+
+    `open_lag` is the difference to the lag of another form that is about as likely [samples].
 
     The numbers of an inferred mode are left out: each depends on the values that were assumed for the others. What the
     data determine is the lag of delay and mode together, so the covariance of the delay is that of this lag.
@@ -82,7 +91,7 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
     if DELAY in found.names:
         delay = found.names.index(DELAY)
         spread = spread.copy()
-        spread[delay, delay] += BETWEEN_SAMPLES**2 * _open_forms(found)
+        spread[delay, delay] += BETWEEN_SAMPLES**2 * _open_forms(found) + open_lag**2
     known_to = max(1.0, found.cost) / INDEPENDENT  # independent parts of the misfit
     covariance = (inverse @ meat @ inverse + known_to * inverse)[:numbers, :numbers]
     origins = sorted({p.origin for p in counted})
@@ -120,9 +129,11 @@ def as_fit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[floa
 def _whole_lag(found: PieceFit) -> Array:
     """Matrix (q, q) that replaces a change of the delay by that of the lag of delay and mode together."""
     matrix, place = np.eye(len(found.names)), {n: k for k, n in enumerate(found.names)}
-    slopes = lag_of_mode(found.model)
-    for name in {SHARE, SHAPE[0]} & place.keys() if DELAY in place else ():
-        matrix[place[DELAY], place[name]] = slopes[name.partition(".")[2]]
+    mode = found.model[ExtraResonance.name]
+    by_share = mode["zeta"] / (np.pi * mode["f0"] * found.model.sample_period)
+    for name, slope in ((SHARE, by_share), (SHAPE[0], -mode["r"] * by_share / mode["f0"])):
+        if {DELAY, name} <= place.keys():
+            matrix[place[DELAY], place[name]] = slope
     return matrix
 
 
@@ -132,7 +143,8 @@ def _open_forms(found: PieceFit) -> float:
     The form of an inferred mode is open even beside a pole.
     """
     values = found.model.values()
-    has_pole = POLE in found.names and values[POLE] < -NO_POLE and not mode_is_inferred(found.model)
+    lagging = amplifier_of(found.model) is not None or values.get(POLE, 0.0) < -NO_POLE
+    has_pole = lagging and not mode_is_inferred(found.model)
     off = values[SHARE] - 1.0 if {SHARE, *SHAPE} <= set(found.names) else 0.0
     return float(not has_pole) + off * off
 

@@ -1,0 +1,106 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where in the chain a low-pass is: before the hysteresis, as that of an amplifier, or behind it.
+
+The lag of slow signals is the same. But the filtered drive turns later and at smaller voltages, and after a step from
+rest the displacement rises along the loop of the filtered drive. A model with the pole in the wrong place predicts
+other rates and amplitudes worse, and its lag is off by up to a tenth of the time constant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...effects import AmplifierBandwidth, AmplifierBandwidthHeld, Arx
+from ...model.model import Model
+from ...record import Notice
+from ..steps.remaining_lag import amplifier_of, lag_beside_mode
+from .mode import held_by, lag_of_mode, mode_notices
+from .piece_fit import PieceFit
+from .pieces import RecordPiece
+from .structure_fit import fit_structure
+
+OPEN = 1.2
+"""Largest ratio of the costs for which it is open where the pole is."""
+LATE = 0.1
+"""Difference between the lags of steps and of other motion that is told [samples]."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LinearPart:
+    """The fit of all free parameters with the linear part that was found.
+
+    Parameters
+    ----------
+    fit : PieceFit
+        The fit.
+    lead : float
+        ln of the factor by which a ringing mode lowers the cost; 0 without such a mode.
+    others : sequence of PieceFit
+        Fits with the pole elsewhere in the chain.
+    late : float
+        How much later the steps come than all other motion says, if they contradict it [samples]; otherwise 0.
+    """
+
+    fit: PieceFit
+    lead: float
+    others: Sequence[PieceFit] = ()
+    late: float = 0.0
+
+    @property
+    def likely(self) -> list[Model]:
+        """Models with the pole elsewhere that describe the records about as well."""
+        return [f.model for f in self.others if f.cost < OPEN * self.fit.cost]
+
+    @property
+    def open_lag(self) -> float:
+        """Largest difference to the lag of such a model [samples]."""
+        return max((abs(_lag(m) - _lag(self.fit.model)) for m in self.likely), default=0.0)
+
+    def notices(self, final: PieceFit) -> list[Notice]:
+        """``ringing``, ``amplifier`` and ``step_time``, with the numbers of the final fit."""
+        found = mode_notices(final)
+        if pole := amplifier_of(final.model):
+            said = f"a low-pass with time constant {pole['tau']:.4g} s acts before the hysteresis, as in an amplifier"
+            behind = any(amplifier_of(m) is None for m in self.likely)
+            found.append(Notice("amplifier", f"{said}; behind it, it is about as likely" if behind else said))
+        if abs(self.late) > LATE:
+            later = "later" if self.late > 0.0 else "earlier"
+            said = f"the steps come {later} than all other motion, as if the drive did not jump at a sample"
+            found.append(Notice("step_time", f"{said}; the lag is that of the other motion"))
+        return found
+
+
+def in_every_place(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> list[PieceFit]:
+    """The fit, and if its dynamics are a pole, those with it before the hysteresis instead; the best one first."""
+    arx = found.model[Arx.name]
+    if arx.array("a").size != 1:
+        return [found]
+    tau = -found.model.sample_period / float(np.log(-arx.array("a")[0]))
+    bare = found.model.with_effect(Arx(a=(), b=(1.0,), delay=arx["delay"]))
+    forms = (
+        bare.with_effect(form(tau=min(tau, form.parameters[0].upper)))
+        for form in (AmplifierBandwidth, AmplifierBandwidthHeld)
+    )
+    tried = (fit_structure(model, pieces, floors, held_by(found)) for model in forms)
+    return sorted((found, *tried), key=lambda f: f.cost)
+
+
+def _lag(model: Model) -> float:
+    """Time by which slow signals are later [samples]."""
+    return (lag_beside_mode(model) + lag_of_mode(model)) / model.sample_period
