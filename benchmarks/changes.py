@@ -51,8 +51,18 @@ def played(stage: Nanopositioner, triangles: bool) -> Experiment:
     return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in zip(names, drives, strict=True)))
 
 
-def changes(day: Nanopositioner) -> Iterator[tuple[str, str, float | None, Nanopositioner]]:
-    """What is changed, the family it belongs to, its size where one number has it, and the stage."""
+def slope_and_loop(stage: Nanopositioner) -> tuple[float, float]:
+    """Displacement over the largest drive, and height of its loop in the middle, as a share of it; without any lag."""
+    bare = replace(stage, creep_fast=0.0, creep_slow=0.0, noise=0.0, pole=0.0, delay=0.0, mode=0.4 / PERIOD, zeta=0.7)
+    quarter = np.linspace(0.0, 1.0, 1000)
+    up = np.concatenate((quarter, quarter[::-1]))
+    y = bare.play(stage.volt * np.concatenate((up, up)), PERIOD).displacement[up.size :]
+    slope = float(np.ptp(y))
+    return slope, float(abs(y[500] - y[1500])) / slope
+
+
+def changes(day: Nanopositioner, before: Nanopositioner) -> Iterator[tuple[str, str, float | None, Nanopositioner]]:
+    """What is changed, the family it belongs to, its size where one number has it, and the stage `day` with it."""
     for samples in (0.1, 0.5, 3.0, 30.0):
         late = replace(day, filter_delay=samples * PERIOD)
         yield f"delay {samples:g} samples", "lag", samples * PERIOD, late
@@ -60,17 +70,21 @@ def changes(day: Nanopositioner) -> Iterator[tuple[str, str, float | None, Nanop
         slow = replace(day, filter_pole=samples * PERIOD)
         yield f"pole {samples:g} samples", "lag", samples * PERIOD, slow
     for samples in (0.2, 2.0, 20.0):
-        before = replace(day, filter_drive=samples * PERIOD)
-        yield f"pole before the hysteresis {samples:g} samples", "lag", samples * PERIOD, before
+        slow = replace(day, filter_drive=samples * PERIOD)
+        yield f"pole before the hysteresis {samples:g} samples", "lag", samples * PERIOD, slow
     for samples in (0.5, 2.0, 10.0):
         twice = replace(day, filter_twice=samples * PERIOD)
         yield f"second order {samples:g} samples", "lag", 2.0**0.5 * samples * PERIOD, twice
     for samples in (1.0, 6.0):
         mean = replace(day, filter_mean=samples * PERIOD)
         yield f"moving average, later by {samples:g} samples", "lag", samples * PERIOD, mean
-    yield "gain + 4 %", "static", None, replace(day, gain=1.04 * day.gain)
-    yield "gain - 6 %", "static", None, replace(day, gain=0.94 * day.gain)
-    yield "loop + 20 %", "hysteresis", None, replace(day, loop=1.2 * day.loop)
+    slope, height = slope_and_loop(before)
+    for factor in (1.04, 0.94):
+        gain = replace(day, gain=factor * day.gain)
+        yield f"gain {100 * factor - 100:+.0f} %", "static", slope_and_loop(gain)[0] / slope - 1.0, gain
+    for factor in (1.2, 0.85):
+        loop = replace(day, loop=factor * day.loop)
+        yield f"loop {100 * factor - 100:+.0f} %", "hysteresis", slope_and_loop(loop)[1] / height - 1.0, loop
     yield "softening 3 %", "dynamics", None, replace(day, softening=0.03)
     yield "drift 1 % in 10 s", "drift", None, replace(day, drift=0.01)
     for drift in (0.05, 0.15):
@@ -110,7 +124,7 @@ def run(options: argparse.Namespace) -> list[Figures]:
         model = identify(played(stage, options.triangles), memory=True).model
         for _ in range(2):
             false += named(model, stage.on_another_day(rng), options.triangles) is not None
-        for what, family, size, changed in changes(stage.on_another_day(rng)):
+        for what, family, size, changed in changes(stage.on_another_day(rng), stage):
             answer = named(model, changed, options.triangles)
             right = answer is not None and answer[0] == family
             holds = error = None

@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 from benchmarks.changes import played as triangles
+from benchmarks.changes import slope_and_loop
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy import Conclusion, Diagnosis, Verdict, diagnose
 from piezo_hysteresis.discrepancy.changes.parameter_changes import find_change, is_unchanged
@@ -102,6 +103,19 @@ def test_the_changed_parameter_is_named(model, another_day, changed, key, size):
 )
 def test_a_large_change_is_named_although_its_form_is_not_exact(model, another_day, changed, key):
     assert change_of(model, replace(another_day, **changed)).key == key
+
+
+@pytest.mark.parametrize("factor", [1.2, 0.85])
+def test_a_larger_loop_is_told_by_its_height_at_the_same_slope(model, another_day, factor):
+    stage = replace(another_day, loop=factor * another_day.loop)
+    (slope, height), (old_slope, old_height) = slope_and_loop(stage), slope_and_loop(STAGE)
+    change = change_of(model, stage)
+    assert change.key == "loop"
+    assert change.size == pytest.approx(height / old_height - 1.0, rel=0.2)
+    assert change.interval_95[0] <= height / old_height - 1.0 <= change.interval_95[1]
+    again = recalibrate(model, played(stage))
+    assert again.loop_height == pytest.approx(height / old_height - 1.0, rel=0.2)
+    assert again.gain == pytest.approx(slope / old_slope - 1.0, abs=0.005)
 
 
 def test_an_amplifier_that_became_slower_is_found_with_its_size():

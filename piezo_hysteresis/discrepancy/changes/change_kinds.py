@@ -148,7 +148,7 @@ class ParameterChange:
         V (mean R²) without and with the change. Gain and loop height are fitted in both, as far as they differ from
         day to day, so V before is smaller than that of the gap.
     session : mapping of str to float
-        Relative changes of ``gain`` and ``loop`` that were fitted together with it.
+        Relative changes of the displacement (``gain``) and of the weights of the loop (``loop``) beside it.
     also : mapping of str to (float, float, float)
         Those of them that have changed by more than from day to day: change of the mean slope or of the loop height,
         and its 95 % interval.

@@ -174,6 +174,13 @@ class ChangeSearch:
         numbers["gain"] -= self.loop_share * numbers.get("loop", 0.0)
         return numbers
 
+    def stated(self, name: str, change: float) -> float:
+        """A change of gain or loop height as a relative change of the mean slope, or of the loop at the same slope.
+
+        The branches of a loop that is larger by x also rise more, by its share of the slope.
+        """
+        return change if name != "loop" else change * (1.0 - self.loop_share) / (1.0 + self.loop_share * change)
+
     def of_equal_records(self, account: Account, floors: Sequence[float]) -> float:
         """V that an account without change leaves, with equal weights of the records; `floors` of the used records [m].
 

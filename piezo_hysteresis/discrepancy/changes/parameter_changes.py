@@ -123,8 +123,8 @@ def find_change(
     near = [e.account.key for e in found[1:] if e.account.cost < same * max(1.0, best.cost)]
     also = _moved_too(search, best, dict(zip(search.sides, beside, strict=True)))
     rivals = tuple(k for k in dict.fromkeys(near) if k != best.key and k not in also)
-    interval = size - half, size + half
-    return ParameterChange(best.key, size, interval, rivals, day.cost, best.left, search.session(best), also)
+    low, middle, high = (search.stated(best.key, number) for number in (size - half, size, size + half))
+    return ParameterChange(best.key, middle, (low, high), rivals, day.cost, best.left, search.session(best), also)
 
 
 def _may_be(found: Explanation, least: float) -> bool:
@@ -149,7 +149,8 @@ def _moved_too(
         size = best.own[name]
         half = float(np.hypot(jackknife, UNCERTAIN * np.sqrt(max(1.0, best.cost)) / best.scale[best.names.index(name)]))
         if name != best.key and _in_deviations(search, best, name) > FARTHEST and _is_sure(size, half):
-            found[name] = size, size - half, size + half
+            low, high = search.stated(name, size - half), search.stated(name, size + half)
+            found[name] = search.stated(name, size), low, high
     return found
 
 

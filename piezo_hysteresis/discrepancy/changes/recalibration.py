@@ -56,7 +56,7 @@ class Recalibration:
     model : Model
         The new model. If its error is not smaller, the old model with the new offset.
     gain, loop_height : float
-        Relative changes [1]; 0 if the model has no loop.
+        Relative changes of the mean slope, and of the loop at the same slope [1]; 0 if the model has no loop.
     lag : float
         Change of the lag [s].
     offset : float
@@ -148,8 +148,8 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     stated = float(model.provenance.get(LARGEST, model.provenance.get(ERROR, "0")))
     return Recalibration(
         replace(new, provenance={**model.provenance, **origin}),
-        session.get("gain", 0.0) if kept else 0.0,
-        session.get("loop", 0.0) if kept else 0.0,
+        best.own["gain"] if kept else 0.0,
+        search.stated("loop", best.own.get("loop", 0.0)) if kept else 0.0,
         best.size if kept else 0.0,
         new[Offset.name]["y0"],
         100.0 * before / span,
