@@ -20,13 +20,13 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ...discrepancy.residual.correlation import CAPTION, correlate
 from ...discrepancy.residual.residual import Errors, zero_per_phase
 from ...errors import RecordError
 from ...identification.identified_range import outside
 from ...identification.records.comparable import comparable
 from ...model import model_file
 from ...record import CONDITIONING, Experiment
+from ...report.correlation import CAPTION, correlate
 from ...report.figures.comparison import ModelComparison, compare
 from ...report.json_file import write_json
 from ...report.tables.error_table import error_table, frequency_table

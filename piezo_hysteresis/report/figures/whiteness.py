@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...discrepancy.residual.correlation import CAPTION, correlate
 from ...errors import RecordError
+from ..correlation import CAPTION, correlate
 from ..palette import BLACK, GREY
 from .comparison import ModelComparison
 from .drawing import Drawing

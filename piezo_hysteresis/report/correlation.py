@@ -23,8 +23,8 @@ import scipy
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
 
-from ...blocks.block import Array
-from ...errors import RecordError
+from ..blocks.block import Array
+from ..errors import RecordError
 
 FALSE_ALARMS = 0.01
 """Probability that any lag of an independent residual exceeds the bounds; it applies to all lags together."""

@@ -19,11 +19,11 @@ import pytest
 from scipy.signal import correlate as scipy_correlate
 from scipy.signal import lfilter
 
-from piezo_hysteresis.discrepancy.residual.correlation import correlate
 from piezo_hysteresis.effects import Arx, BoucWen, Creep
 from piezo_hysteresis.errors import RecordError
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
+from piezo_hysteresis.report.correlation import correlate
 
 RANDOM = np.random.default_rng(7)
 
