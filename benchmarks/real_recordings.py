@@ -36,11 +36,11 @@ import numpy as np
 from benchmarks.figures import Cell, Figures, alone
 from piezo_hysteresis import recording
 from piezo_hysteresis.discrepancy import diagnose
-from piezo_hysteresis.discrepancy.residual.noise_floor import drive_period
 from piezo_hysteresis.effects import CATALOGUE, ThermalDrift
 from piezo_hysteresis.identification.fit.fit import fit
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.records.noise_floor import drive_period
 from piezo_hysteresis.identification.steps.dynamics import identify_arx
 from piezo_hysteresis.identification.steps.three_steps import voltage_signals
 from piezo_hysteresis.model.model import Model

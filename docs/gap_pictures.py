@@ -38,7 +38,6 @@ from piezo_hysteresis.discrepancy.choice.time_to_decide import (
     z_of,
 )
 from piezo_hysteresis.discrepancy.next_experiment import possible_drives
-from piezo_hysteresis.discrepancy.residual.noise_floor import noise_floors, stroke
 from piezo_hysteresis.discrepancy.search.acceptance_tests import KEEPS, share_left
 from piezo_hysteresis.discrepancy.search.candidate_refits import LATER, LEAST_GAIN, refit_candidates
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate, screen
@@ -50,6 +49,7 @@ from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
 from piezo_hysteresis.identification.protocol import protocol
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.identification.records.noise_floor import noise_floors, stroke
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.report.figures.style import MEASURED, PREDICTED, SETTINGS, canvas
 from piezo_hysteresis.report.palette import BLACK, BLUE, GREEN, GREY, ORANGE

@@ -26,7 +26,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from piezo_hysteresis import Record
-from piezo_hysteresis.discrepancy.residual.noise_floor import white_noise
+from piezo_hysteresis.identification.records.noise_floor import white_noise
 from piezo_hysteresis.report.figures.style import FLOOR, SETTINGS, canvas
 from piezo_hysteresis.report.palette import BLACK
 

@@ -21,11 +21,11 @@ runs them all.
 
 from __future__ import annotations
 
+from ..identification.records.noise_floor import floors, noise_floors, stroke
 from .diagnose import diagnose
 from .diagnosis import Conclusion, Diagnosis, Verdict
 from .gap import Gap, measure_gap
 from .residual.localise import ResidualShare, localise
-from .residual.noise_floor import floors, noise_floors, stroke
 from .search.selection import select
 from .search.selection_result import Selection
 

@@ -30,6 +30,7 @@ from ..identification.fit.fit import Fit
 from ..identification.fit.normal_equations import Nuisance
 from ..identification.identify import identify
 from ..identification.records.conditioning import with_conditioning
+from ..identification.records.noise_floor import floors, noise_floors, noise_of_averages, stroke
 from ..identification.structure.left_out import has_several_drives, score_left_out
 from ..model.model import Model
 from ..model.provenance import provenance
@@ -40,7 +41,6 @@ from .excitation_check import missing_excitation
 from .gap import Gap, measure_gap, with_stated_error
 from .next_experiment import best_next_experiment
 from .residual.localise import located
-from .residual.noise_floor import floors, noise_floors, noise_of_averages, stroke
 from .residual.sampling import shortened
 from .search.baseline import as_conditioning, with_zero
 from .search.candidates import loop_is_off, score_model

@@ -21,13 +21,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..discrepancy import diagnose
-from ..discrepancy.residual.noise_floor import floors, noise_floors
 from ..discrepancy.residual.residual import errors, zero_per_phase
 from ..effects import HYSTERESIS, OPERATORS
 from ..errors import ParameterError
 from ..identification.identified_range import outside
 from ..identification.identify import identify
 from ..identification.records.comparable import comparable
+from ..identification.records.noise_floor import floors, noise_floors
 from ..model import model_file
 from ..record import Experiment
 from ..report.words import POOR, USELESS

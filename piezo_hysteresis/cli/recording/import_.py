@@ -20,8 +20,8 @@ import argparse
 from pathlib import Path
 
 from ... import recording
-from ...discrepancy.residual.noise_floor import noise_floors
 from ...errors import RecordingError
+from ...identification.records.noise_floor import noise_floors
 from ...record import Experiment
 from ...report.json_file import write_json
 from ...report.tables.quality_table import notice_table, record_table, understood_table

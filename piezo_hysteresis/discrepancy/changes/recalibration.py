@@ -34,11 +34,11 @@ from ...errors import IdentificationError, ParameterError
 from ...identification.fit.normal_equations import Nuisance, residuals
 from ...identification.records.conditioning_split import conditioning_length, covers
 from ...identification.records.noise import without_voltage_noise
+from ...identification.records.noise_floor import floors, stroke
 from ...model.model import Model
 from ...model.provenance import LARGEST, largest_error, provenance
 from ...record import CONDITIONING, Experiment, Record
 from ..excitation_check import check_motion, moves
-from ..residual.noise_floor import floors, stroke
 from .change_kinds import ParameterChange
 from .change_search import ChangeSearch
 from .moved_group import is_as_good

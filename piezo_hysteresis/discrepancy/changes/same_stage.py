@@ -25,13 +25,13 @@ from ...effects import ExtraResonance, Softening, ThermalDrift
 from ...errors import DivergenceError, ModelError, ParameterError
 from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.comparable import comparable
+from ...identification.records.noise_floor import floors, noise_floors, stroke
 from ...model.model import Model
 from ...model.provenance import data_hash
 from ...record import Experiment, Notice, Record
 from ..diagnosis import Conclusion, Diagnosis
 from ..gap import measure_gap, with_stated_error
 from ..residual.localise import located
-from ..residual.noise_floor import floors, noise_floors, stroke
 from .change_kinds import KINDS, LEAVES, ParameterChange
 from .parameter_changes import find_change, is_unchanged
 from .signatures import DRIFT_TIME, creep_numbers, loop_numbers, shaped_model

@@ -31,9 +31,9 @@ from ...effects import MainsHum
 from ...errors import RecordError
 from ...identification.fit.normal_equations import Nuisance, residuals
 from ...identification.records.conditioning import with_conditioning
+from ...identification.records.noise_floor import stroke
 from ...model.model import Model
 from ...record import CONDITIONING, Experiment, Record
-from .noise_floor import stroke
 
 SINE = re.compile(r"sine_([0-9.]+)hz")
 """Phase name of a sine, with its frequency [Hz]."""

@@ -32,10 +32,10 @@ from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.form_uncertainty import ADEQUACY
 from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.conditioning import records_to_fit
+from ...identification.records.noise_floor import noise_floors, noise_of_averages, stroke
 from ...model.model import Model
 from ...record import Record
 from ..residual.intersample_error import intersample_error
-from ..residual.noise_floor import noise_floors, noise_of_averages, stroke
 from ..residual.sampling import at_period, common_period, less, shortened, slowed
 from .baseline import exact, modal_models, start_models
 from .candidates import score_baseline, score_model

@@ -23,7 +23,7 @@ from bokeh.document import Document
 from bokeh.layouts import column
 from bokeh.models import Select, Toggle
 
-from ...discrepancy.residual.noise_floor import white_noise
+from ...identification.records.noise_floor import white_noise
 from ...record import Record
 from . import panels
 from .axis_state import AxisState

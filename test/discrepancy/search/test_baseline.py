@@ -17,7 +17,6 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.residual.noise_floor import noise_floors
 from piezo_hysteresis.discrepancy.search import baseline_setup
 from piezo_hysteresis.discrepancy.search.baseline import exact, start_models
 from piezo_hysteresis.discrepancy.search.cross_validation import Score
@@ -27,6 +26,7 @@ from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.identification.records.noise_floor import noise_floors
 from piezo_hysteresis.identification.steps.linear_start import dynamics_of
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record

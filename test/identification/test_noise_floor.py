@@ -17,7 +17,8 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.residual.noise_floor import (
+from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
+from piezo_hysteresis.identification.records.noise_floor import (
     drive_period,
     floors,
     noise_floors,
@@ -26,7 +27,6 @@ from piezo_hysteresis.discrepancy.residual.noise_floor import (
     stroke,
     white_noise,
 )
-from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
 from piezo_hysteresis.record import Record
 
 RANDOM = np.random.default_rng(3)

@@ -28,9 +28,9 @@ import scipy
 
 from ...blocks.block import Array
 from ...channel_mapping import quantity_of
-from ...identification.fit.form_uncertainty import ADEQUACY
-from ...identification.records.noise import noise_on_motion
 from ...record import Experiment, Record
+from ..fit.form_uncertainty import ADEQUACY
+from .noise import noise_on_motion
 
 MAINS = (50.0, 60.0)
 """Mains frequencies [Hz]."""
