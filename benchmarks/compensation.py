@@ -38,7 +38,7 @@ from benchmarks.figures import Cell, Figures, alone
 from benchmarks.naming_experiments import PackagedPlant, rich
 from piezo_hysteresis.compensation import IterativeLearning, Limits, Plan, learn, plan
 from piezo_hysteresis.discrepancy import diagnose
-from piezo_hysteresis.discrepancy.residual.residual import errors
+from piezo_hysteresis.identification.free_run_error import errors
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 

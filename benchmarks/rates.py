@@ -42,8 +42,8 @@ import numpy as np
 
 from benchmarks.figures import Cell, Figures, alone
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
-from piezo_hysteresis.discrepancy.residual.residual import errors, zero_per_phase
 from piezo_hysteresis.effects import ExtraResonance
+from piezo_hysteresis.identification.free_run_error import errors, zero_per_phase
 from piezo_hysteresis.identification.identification import Identification
 from piezo_hysteresis.identification.identified_range import LAG_ERROR
 from piezo_hysteresis.identification.identify import identify

@@ -25,7 +25,7 @@ import published
 from exhibit import DYNAMIC, STATIC, Exhibit, canvas, main
 from two_stages import OPERATORS, TITLES, alone, experiment, joint
 
-from piezo_hysteresis.discrepancy.residual.residual import errors
+from piezo_hysteresis.identification.free_run_error import errors
 from piezo_hysteresis.model.model import Model
 
 

@@ -21,9 +21,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..discrepancy import diagnose
-from ..discrepancy.residual.residual import errors, zero_per_phase
 from ..effects import HYSTERESIS, OPERATORS
 from ..errors import ParameterError
+from ..identification.free_run_error import errors, zero_per_phase
 from ..identification.identified_range import outside
 from ..identification.identify import identify
 from ..identification.records.comparable import comparable

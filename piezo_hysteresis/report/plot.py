@@ -17,8 +17,8 @@
 from __future__ import annotations
 
 from ..discrepancy import Diagnosis
-from ..discrepancy.residual.residual import zero_per_phase
 from ..errors import RecordError
+from ..identification.free_run_error import zero_per_phase
 from ..identification.identification import Identification
 from ..model.model import Model
 from ..record import Experiment, Record

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..discrepancy.residual.residual import Errors
+from ..identification.free_run_error import Errors
 from .figures.comparison import ModelComparison
 from .words import nanometre
 

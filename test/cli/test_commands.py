@@ -24,8 +24,8 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis import recording
-from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.identification.free_run_error import errors
 from piezo_hysteresis.model import model_file
 from piezo_hysteresis.stage.hidden import HIDDEN_EFFECTS
 

@@ -29,8 +29,8 @@ from piezo_hysteresis.discrepancy.changes.same_stage import changed_model, sente
 from piezo_hysteresis.discrepancy.diagnose import compared_with_given
 from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
 from piezo_hysteresis.discrepancy.passes import compare_with_given_model, prepare
-from piezo_hysteresis.discrepancy.residual.residual import errors, zero_per_phase
 from piezo_hysteresis.effects import CATALOGUE
+from piezo_hysteresis.identification.free_run_error import errors, zero_per_phase
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.records.noise_floor import floors
 from piezo_hysteresis.identification.steps.remaining_lag import amplifier_of

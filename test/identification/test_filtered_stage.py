@@ -18,8 +18,8 @@ import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from benchmarks.rates import lag_holds
-from piezo_hysteresis.discrepancy.residual.residual import errors, zero_per_phase
 from piezo_hysteresis.effects import ExtraResonance
+from piezo_hysteresis.identification.free_run_error import errors, zero_per_phase
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.steps.remaining_lag import amplifier_of, lag
 from piezo_hysteresis.record import Experiment

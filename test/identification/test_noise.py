@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
-from piezo_hysteresis.discrepancy.residual.residual import errors, zero_per_phase
 from piezo_hysteresis.effects import ExtraResonance
+from piezo_hysteresis.identification.free_run_error import errors, zero_per_phase
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.records.comparable import comparable
 from piezo_hysteresis.identification.records.excitation_content import excitation_content

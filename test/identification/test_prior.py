@@ -22,7 +22,6 @@ import pytest
 from benchmarks import one_amplitude
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from benchmarks.rates import lag_holds, played
-from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.effects import (
     Arx,
     BoucWen,
@@ -32,6 +31,7 @@ from piezo_hysteresis.effects import (
     LevelDependentMemory,
 )
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.identification.free_run_error import errors
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.steps.remaining_lag import lag
 from piezo_hysteresis.identification.structure.piece_fit import linearised

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
-from piezo_hysteresis.discrepancy.residual.residual import errors, zero_per_phase
 from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.identification.free_run_error import errors, zero_per_phase
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.structure.pieces import Kind, RecordPiece
 from piezo_hysteresis.identification.structure.ringing import decay_after_steps

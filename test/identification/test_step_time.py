@@ -21,8 +21,8 @@ import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from benchmarks.rates import PERIOD
-from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.identification.free_run_error import errors
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.record import Experiment, Record
 

@@ -20,9 +20,9 @@ import numpy as np
 import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
-from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.effects import Arx, BoucWen, Creep, CreepTwoRates, ExtraResonance, HysteresisMemory
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.identification.free_run_error import errors
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.steps.remaining_lag import lag
 from piezo_hysteresis.identification.structure.left_out import score_left_out

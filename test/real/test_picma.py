@@ -26,8 +26,8 @@ import pytest
 from piezo_hysteresis import recording
 from piezo_hysteresis.cli.main import main
 from piezo_hysteresis.discrepancy import Verdict, diagnose
-from piezo_hysteresis.discrepancy.residual.residual import errors
 from piezo_hysteresis.effects import ThermalDrift
+from piezo_hysteresis.identification.free_run_error import errors
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.steps.remaining_lag import amplifier_of
 

@@ -20,8 +20,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ...discrepancy.residual.residual import Errors, zero_per_phase
 from ...errors import RecordError
+from ...identification.free_run_error import Errors, zero_per_phase
 from ...identification.identified_range import outside
 from ...identification.records.comparable import comparable
 from ...model import model_file

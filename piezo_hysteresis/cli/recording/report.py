@@ -20,8 +20,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ...discrepancy.residual.residual import zero_per_phase
 from ...errors import ParameterError, RecordingError
+from ...identification.free_run_error import zero_per_phase
 from ...identification.records.comparable import comparable
 from ...model import model_file
 from ...report.figures.comparison import compare

@@ -68,6 +68,13 @@ class Nuisance:
                     rows += [cosine, sine]
         return np.array(rows).reshape(len(rows), size)
 
+    def removed_from(self, residual: Array, record: Record) -> Array:
+        """The residual of a record without these disturbances, shape (n,) [m]."""
+        rows = self.rows(record, slice(0, record.size))
+        if not len(rows):
+            return residual
+        return np.asarray(residual - np.linalg.lstsq(rows @ rows.T, rows @ residual, rcond=None)[0] @ rows)
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Gram:
@@ -150,11 +157,5 @@ def grams(
 def residuals(model: Model, records: Sequence[Record], nuisance: Nuisance | None = None) -> list[Array]:
     """Measured minus free-run displacement of every record [m], without the disturbances."""
     nuisance = nuisance or Nuisance()
-    result = []
-    for record, y in zip(records, model.free_run(records), strict=True):
-        residual = record.displacement - y
-        rows = nuisance.rows(record, slice(0, record.size))
-        if len(rows):
-            residual = residual - np.linalg.lstsq(rows @ rows.T, rows @ residual, rcond=None)[0] @ rows
-        result.append(residual)
-    return result
+    pairs = zip(records, model.free_run(records), strict=True)
+    return [nuisance.removed_from(record.displacement - y, record) for record, y in pairs]

@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...discrepancy import Diagnosis
-from ...discrepancy.residual.residual import Errors, errors, zero_per_phase
 from ...errors import DivergenceError
 from ...identification.fit.normal_equations import Nuisance
+from ...identification.free_run_error import Errors, errors, zero_per_phase
 from ...identification.records.noise_floor import floors, noise_floors
 from ...model.model import Model
 from ...record import Experiment

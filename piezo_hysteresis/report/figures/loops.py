@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
-from ...discrepancy.residual.residual import drive_frequency
+from ...identification.free_run_error import drive_frequency
 from ...record import Record
 from .comparison import ModelComparison
 from .drawing import Drawing

@@ -21,7 +21,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from ...discrepancy.residual.residual import Errors
+from ...identification.free_run_error import Errors
 from ..palette import BLUE, GREY, ORANGE
 from .comparison import ModelComparison
 from .drawing import Drawing

@@ -19,10 +19,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.residual.residual import drive_frequency, errors
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.errors import ModelError, RecordError
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.identification.free_run_error import drive_frequency, errors
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 
