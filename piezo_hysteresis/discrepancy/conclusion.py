@@ -25,10 +25,11 @@ from ..identification.fit.fit import Fit, Progress
 from ..identification.fit.form_uncertainty import with_form_uncertainty
 from ..identification.fit.normal_equations import Nuisance
 from ..model.model import Model
+from ..model.provenance import with_stated_error
 from ..record import Experiment
 from .diagnosis import Conclusion, Diagnosis, Verdict
 from .excitation_check import missing_excitation
-from .gap import Gap, measure_gap, with_stated_error
+from .gap import Gap, measure_gap
 from .next_experiment import best_next_experiment
 from .residual.localise import ResidualShare
 from .search.baseline_setup import BaselineSetup

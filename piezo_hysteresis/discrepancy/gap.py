@@ -25,7 +25,6 @@ import scipy
 from ..blocks.block import Array
 from ..identification.fit.normal_equations import Nuisance
 from ..model.model import Model
-from ..model.provenance import LARGEST, free_run
 from ..record import Record
 from .residual.residual import residuals_on
 from .search.cross_validation import ADEQUATE
@@ -93,12 +92,6 @@ class Gap:
         """V before and after: mean over the records of the squared error, in floors."""
         before, after = ([(getattr(p, when) / p.floor) ** 2 for p in self.per_phase] for when in ("before", "after"))
         return float(np.mean(before)), float(np.mean(after))
-
-
-def with_stated_error(model: Model, percent: float, stroke: float) -> Model:
-    """The model with its free-run error in the provenance; `percent` is in % of the `stroke` [m]."""
-    origin = {key: text for key, text in model.provenance.items() if key != LARGEST}  # that of other records
-    return replace(model, provenance={**origin, **free_run(0.01 * percent * stroke, percent)})
 
 
 def measure_gap(

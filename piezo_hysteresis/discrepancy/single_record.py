@@ -33,12 +33,12 @@ from ..identification.records.conditioning import with_conditioning
 from ..identification.records.noise_floor import floors, noise_floors, noise_of_averages, stroke
 from ..identification.structure.left_out import has_several_drives, score_left_out
 from ..model.model import Model
-from ..model.provenance import provenance
+from ..model.provenance import provenance, with_stated_error
 from ..record import Notice, Record
 from .diagnosis import Conclusion, Diagnosis
 from .diagnosis_state import DiagnosisState
 from .excitation_check import missing_excitation
-from .gap import Gap, measure_gap, with_stated_error
+from .gap import Gap, measure_gap
 from .next_experiment import best_next_experiment
 from .residual.localise import located
 from .residual.sampling import shortened

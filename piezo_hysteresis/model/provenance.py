@@ -18,11 +18,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
 
 from ..record import Experiment
+from .model import Model
 
 LARGEST = "largest_record_error"
 """Key of the largest error of one record. The free-run error is a mean over kinds of drive, and one kind has more."""
@@ -59,6 +61,12 @@ def free_run(error: float, percent: float) -> Mapping[str, str]:
         "free_run_error": repr(float(f"{error:.6g}")),
         "free_run_error_percent": repr(float(f"{percent:.6g}")),
     }
+
+
+def with_stated_error(model: Model, percent: float, stroke: float) -> Model:
+    """The model with its free-run error in the provenance; `percent` is in % of the `stroke` [m]."""
+    origin = {key: text for key, text in model.provenance.items() if key != LARGEST}  # that of other records
+    return replace(model, provenance={**origin, **free_run(0.01 * percent * stroke, percent)})
 
 
 def data_hash(experiment: Experiment) -> str:

@@ -27,10 +27,10 @@ from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.comparable import comparable
 from ...identification.records.noise_floor import floors, noise_floors, stroke
 from ...model.model import Model
-from ...model.provenance import data_hash
+from ...model.provenance import data_hash, with_stated_error
 from ...record import Experiment, Notice, Record
 from ..diagnosis import Conclusion, Diagnosis
-from ..gap import measure_gap, with_stated_error
+from ..gap import measure_gap
 from ..residual.localise import located
 from .change_kinds import KINDS, LEAVES, ParameterChange
 from .parameter_changes import find_change, is_unchanged

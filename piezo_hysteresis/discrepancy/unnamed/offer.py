@@ -25,7 +25,8 @@ from ...blocks.block import Array
 from ...effects import Creep, Offset, UnnamedCorrection, UnnamedPlays, UnnamedPositionMap, UnnamedRelaxation
 from ...identification.identified_range import identified_range
 from ...model.model import Model
-from ..gap import measure_gap, with_stated_error
+from ...model.provenance import with_stated_error
+from ..gap import measure_gap
 from ..search.baseline_setup import BaselineSetup
 from ..search.candidate_refits import LEAST_GAIN
 from ..search.refit import FAILURES, LAST, PRECISE, joint
