@@ -16,8 +16,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from ...effects import AmplifierSaturation
 from .candidate_refits import LATER, LEAST_GAIN
 from .candidates import FittedCandidate
@@ -28,42 +26,24 @@ from .selection_result import Rejection, typical
 KEEPS = 0.8
 """Largest share of V beyond noise that may remain after an effect."""
 
-AcceptanceTest = Callable[[FittedCandidate, Score], Rejection | None]
-"""Takes a fitted candidate and the score of the model before it; None if it passes."""
-
-
-def gains_little(best: FittedCandidate, before: Score) -> Rejection | None:
-    """The gain in cross-validation is too small."""
-    gain = before.cost - best.score.cost
-    if gain >= LEAST_GAIN:
-        return None
-    return Rejection(best.name, f"in cross-validation it lowers mean ln R² by {gain:.2f}, and {LEAST_GAIN:g} is needed")
-
-
-def leaves_much(best: FittedCandidate, before: Score) -> Rejection | None:
-    """Most of the error beyond noise remains."""
-    left = share_left(best.score, before, best.training_data.null)
-    if left <= KEEPS:
-        return None
-    return Rejection(best.name, f"{100 * left:.0f} % of the excess error remains, and {100 * KEEPS:.0f} % is allowed")
-
-
-def owes_its_gain(best: FittedCandidate, before: Score) -> Rejection | None:
-    """The gain is due to the refit of everything else, and not to the effect."""
-    alone = without(best, LATER)
-    owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
-    if owed >= LEAST_GAIN:
-        return None
-    return Rejection(best.name, f"it gains only {owed:.2f} over the model that was refitted without it")
-
-
-TESTS: tuple[AcceptanceTest, ...] = (gains_little, leaves_much, owes_its_gain)
-"""The tests, the cheap ones first; the first rejection counts."""
-
 
 def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
-    """First reason to reject a fitted candidate; None if it passes all tests."""
-    return next((found for test in TESTS if (found := test(best, before)) is not None), None)
+    """First reason to reject a fitted candidate; None if it passes all tests. The cheap tests come first."""
+    gain = before.cost - best.score.cost
+    if gain < LEAST_GAIN:
+        return Rejection(
+            best.name, f"in cross-validation it lowers mean ln R² by {gain:.2f}, and {LEAST_GAIN:g} is needed"
+        )
+    left = share_left(best.score, before, best.training_data.null)
+    if left > KEEPS:
+        return Rejection(
+            best.name, f"{100 * left:.0f} % of the excess error remains, and {100 * KEEPS:.0f} % is allowed"
+        )
+    alone = without(best, LATER)
+    owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
+    if owed < LEAST_GAIN:
+        return Rejection(best.name, f"it gains only {owed:.2f} over the model that was refitted without it")
+    return None
 
 
 def share_left(after: Score, before: Score, null: float) -> float:
