@@ -161,6 +161,11 @@ class Effect(ABC):
         """The same effect with some values replaced."""
         return type(self)(**{**self._values, **values})
 
+    @classmethod
+    def is_twin_of(cls, other: Effect | type[Effect]) -> bool:
+        """Whether slow drive cannot distinguish the two effects; one of the two names the other one as its twin."""
+        return cls.twin == other.name or other.twin == cls.name
+
     def off(self) -> Self:
         """The same effect, exactly switched off."""
         switched: dict[str, Value] = {

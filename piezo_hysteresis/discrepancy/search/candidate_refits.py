@@ -110,7 +110,7 @@ def refits_of_twins(candidates: Sequence[Candidate], best: FittedCandidate, befo
 
     Each refit begins with the fitted model of the best one, because the loop is the same.
     """
-    twins = [c for c in candidates if best.effect.twin == c.name or c.effect.twin == best.name]
+    twins = [c for c in candidates if c.effect.is_twin_of(best.effect)]
     from_best = partial(refit, best.fit.model.without(best.name), max_iterations=LATER)
     return _collected(partial(_settled, from_best, before), twins)
 

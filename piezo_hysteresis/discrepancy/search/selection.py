@@ -99,7 +99,7 @@ def _turn(
     progress("score test of the catalogue", 0.0)
     training_data = training_data.with_peaks(residuals(model, training_data.records, training_data.nuisance))
     present = {e.public_name() for e in model.effects}
-    twins = {e.name: t.name for e in effects for t in model.effects if e.twin == t.name or t.twin == e.name}
+    twins = {e.name: t.name for e in effects for t in model.effects if e.is_twin_of(t)}
     absent = [e for e in effects if e.public_name() not in present and e.name not in twins]
     screened = screen(model, training_data, absent)
     likely = [c for k, c in enumerate(screened[:REFITS]) if k < 2 or before.cost - c.score.cost > HOPELESS]
@@ -141,7 +141,7 @@ def _best_of_each(refits: list[FittedCandidate]) -> list[FittedCandidate]:
 
 def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> Rejection | None:
     """Rejection of an effect whose twin is not among the candidates, because the data cannot distinguish the two."""
-    twins = {e.public_name() for e in CATALOGUE if effect.twin == e.name or e.twin == effect.name}
+    twins = {e.public_name() for e in CATALOGUE if effect.is_twin_of(e)}
     for untried in sorted(twins - {e.public_name() for e in effects}):
         return Rejection(effect.name, f"on slow drive it equals {untried}, which was not among the candidates")
     return None
