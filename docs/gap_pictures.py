@@ -39,7 +39,7 @@ from piezo_hysteresis.discrepancy.choice.time_to_decide import (
 )
 from piezo_hysteresis.discrepancy.next_experiment import possible_drives
 from piezo_hysteresis.discrepancy.search.acceptance_tests import KEEPS, share_left
-from piezo_hysteresis.discrepancy.search.candidate_refits import LATER, LEAST_GAIN, refit_candidates
+from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, refit_candidates
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate, screen
 from piezo_hysteresis.discrepancy.search.cross_validation import ADEQUATE
 from piezo_hysteresis.discrepancy.search.refit import without
@@ -218,7 +218,7 @@ def acceptance(diagnosis: Diagnosis) -> Figure:
     gains.axvline(LEAST_GAIN, color=ORANGE, linestyle="--", label=f"limit: at least {LEAST_GAIN:g}")
     left.barh(at, [100.0 * share_left(c.score, before, null) for c in fitted], color=colours)
     left.axvline(100.0 * KEEPS, color=ORANGE, linestyle="--", label=f"limit: at most {100 * KEEPS:.0f} %")
-    alone = without(fitted[0], LATER)
+    alone = without(fitted[0])
     if alone is not None:
         mark = {"marker": "D", "linestyle": "none", "color": BLACK, "label": "beside the model refitted without it"}
         gains.plot(alone.score.cost - fitted[0].score.cost, 0, **mark)

@@ -23,11 +23,12 @@ from __future__ import annotations
 
 from ..identification.records.noise_floor import floors, noise_floors, stroke
 from .diagnose import diagnose
-from .diagnosis import Conclusion, Diagnosis, Verdict
+from .diagnosis import Diagnosis
 from .gap import Gap, measure_gap
 from .residual.localise import ResidualShare, localise
 from .search.selection import select
 from .search.selection_result import Selection
+from .verdict import Conclusion, Verdict
 
 __all__ = [
     "Conclusion",

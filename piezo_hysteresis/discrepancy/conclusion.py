@@ -27,7 +27,7 @@ from ..identification.fit.normal_equations import Nuisance
 from ..model.model import Model
 from ..model.provenance import with_stated_error
 from ..record import Experiment
-from .diagnosis import Conclusion, Diagnosis, Verdict
+from .diagnosis import Diagnosis
 from .excitation_check import missing_excitation
 from .gap import Gap, measure_gap
 from .next_experiment import best_next_experiment
@@ -37,7 +37,7 @@ from .search.refit import LAST, PRECISE, joint, restart
 from .search.selection_result import Selection
 from .search.training_data import TrainingData
 from .unnamed.offer import best_correction
-from .verdict import conclusion_of, is_explained
+from .verdict import Conclusion, Verdict, conclusion_of, is_explained
 
 NOISY, WORTHWHILE = 1.1, 0.95
 """Ratio of the cost to the cost of noise above which the last fit is restarted, and largest ratio of the new cost to

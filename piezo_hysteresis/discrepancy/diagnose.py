@@ -30,10 +30,11 @@ from ..identification.one_core import on_one_core
 from ..model.model import Model
 from ..record import Notice, Record
 from .changes.same_stage import UNCHANGED
-from .diagnosis import Conclusion, Diagnosis, Verdict
+from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .passes import PASSES
 from .search.execution.cores import using_cores
+from .verdict import Conclusion, Verdict
 
 GIVEN_DIVERGES = "given_model_diverges"
 """Kind of the notice that the given model is not used."""

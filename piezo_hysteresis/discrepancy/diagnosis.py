@@ -27,13 +27,11 @@ from ..picture import Pictured
 from ..record import Experiment
 from .changes.change_kinds import ParameterChange
 from .choice.time_to_decide import Separation
-from .gap import Gap
+from .gap import Gap, gap_answer
 from .residual.localise import ResidualShare
 from .search.selection_result import Rejection, Selection
 from .unnamed.correction import Correction
 from .verdict import Conclusion, Verdict
-
-__all__ = ["Conclusion", "Diagnosis", "Verdict"]
 
 SCHEMA = 1
 """Version of the JSON answer."""
@@ -140,24 +138,6 @@ class Diagnosis(Pictured):
             )
         return rows
 
-    def _gap(self) -> dict[str, Any]:
-        gap = self.gap
-        if gap is None:
-            unknown = dict.fromkeys(("before", "after", "live", "floor", "after_interval_95"))
-            return {**unknown, "unseen": False, "per_phase": {}}
-        return {
-            "before": gap.before,
-            "after": gap.after,
-            "live": gap.live,
-            "floor": gap.floor,
-            "after_interval_95": None if gap.interval_95 is None else list(gap.interval_95),
-            "unseen": gap.unseen,
-            "per_phase": {
-                f"{p.index:02d}_{p.phase}": {"before": p.before, "after": p.after, "floor": p.floor}
-                for p in gap.per_phase
-            },
-        }
-
     def answer(self, model_file: str = "") -> dict[str, Any]:
         """The answer for ``answer.json``, in a stable, versioned form.
 
@@ -173,7 +153,7 @@ class Diagnosis(Pictured):
             "reason": self.reason,
             "effects": self.effects(),
             "where": [{"axis": p.axis, "share": round(p.share, 4), "detail": p.detail} for p in self.where],
-            "gap_percent_of_range": self._gap(),
+            "gap_percent_of_range": gap_answer(self.gap),
             "rejected": [asdict(r) for r in self.rejected],
             "next_experiment": None if self.next_experiment is None else self.next_experiment.answer(),
             "data_quality": [asdict(n) for n in self.experiment.notices],

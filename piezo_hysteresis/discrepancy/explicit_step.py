@@ -35,10 +35,9 @@ from ..identification.records.conditioning import with_conditioning
 from ..model.model import Model
 from ..record import Experiment, Notice, Record
 from .residual.sampling import at_period, is_faster, less
-from .search.candidate_refits import LATER
 from .search.candidates import adjusted_numbers, directions
 from .search.cross_validation import cross_validate
-from .search.refit import FAILURES, joint
+from .search.refit import FAILURES, LATER, joint
 from .search.training_data import TrainingData
 
 KIND = "explicit_step"

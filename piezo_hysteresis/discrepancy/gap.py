@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy
@@ -92,6 +93,24 @@ class Gap:
         """V before and after: mean over the records of the squared error, in floors."""
         before, after = ([(getattr(p, when) / p.floor) ** 2 for p in self.per_phase] for when in ("before", "after"))
         return float(np.mean(before)), float(np.mean(after))
+
+
+def gap_answer(gap: Gap | None) -> dict[str, Any]:
+    """The gap as in ``answer.json``, in % of range; without values if there is none."""
+    if gap is None:
+        unknown = dict.fromkeys(("before", "after", "live", "floor", "after_interval_95"))
+        return {**unknown, "unseen": False, "per_phase": {}}
+    return {
+        "before": gap.before,
+        "after": gap.after,
+        "live": gap.live,
+        "floor": gap.floor,
+        "after_interval_95": None if gap.interval_95 is None else list(gap.interval_95),
+        "unseen": gap.unseen,
+        "per_phase": {
+            f"{p.index:02d}_{p.phase}": {"before": p.before, "after": p.after, "floor": p.floor} for p in gap.per_phase
+        },
+    }
 
 
 def measure_gap(

@@ -21,7 +21,7 @@ from dataclasses import replace
 from ..errors import DivergenceError
 from ..model.model import Model
 from .conclusion import concluded
-from .diagnosis import Conclusion, Diagnosis
+from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .explicit_step import explicit_model, without_steps
 from .residual.localise import ResidualShare, located
@@ -30,6 +30,7 @@ from .search.cross_validation import ADEQUATE
 from .search.execution.time_limit import ending_at
 from .search.selection import select
 from .search.selection_result import Selection
+from .verdict import Conclusion
 
 STEPS_LEAVE = 10.0
 """Largest cost after the subtraction of an explicit step, if it is subtracted before the search."""

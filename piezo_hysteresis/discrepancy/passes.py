@@ -24,14 +24,14 @@ from ..identification.records.comparable import comparable
 from ..identification.records.roles import roles_of
 from ..record import Notice
 from .changes.same_stage import same_stage
-from .diagnosis import Conclusion, Diagnosis
+from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .excitation_check import check_motion, moves
 from .many_records import diagnose_many
 from .residual.sampling import is_faster, resampled
 from .single_record import diagnose_few
 from .unnamed.correction import without_corrections
-from .verdict import FEWEST_RECORDS
+from .verdict import FEWEST_RECORDS, Conclusion
 
 RESAMPLED = "resampled"
 """Kind of the notice about records that are faster than the given model."""

@@ -35,7 +35,7 @@ from ..identification.structure.left_out import has_several_drives, score_left_o
 from ..model.model import Model
 from ..model.provenance import provenance, with_stated_error
 from ..record import Notice, Record
-from .diagnosis import Conclusion, Diagnosis
+from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .excitation_check import missing_excitation
 from .gap import Gap, measure_gap
@@ -53,7 +53,7 @@ from .search.selection import select
 from .search.selection_result import Selection, Step, explained
 from .search.structure_steps import structure_steps
 from .search.test_records import choose_test_records
-from .verdict import FEWEST_RECORDS, MORE_MAY_BE_MISSING, conclusion_of, is_explained
+from .verdict import FEWEST_RECORDS, MORE_MAY_BE_MISSING, Conclusion, conclusion_of, is_explained
 
 SHARP = 1e-6
 """Relative decrease of the cost at convergence of the baseline: few records take little time."""

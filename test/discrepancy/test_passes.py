@@ -22,8 +22,8 @@ import pytest
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy import diagnose
 from piezo_hysteresis.discrepancy.diagnose import GIVEN_DIVERGES
-from piezo_hysteresis.discrepancy.diagnosis import Conclusion, Verdict
 from piezo_hysteresis.discrepancy.passes import RESAMPLED
+from piezo_hysteresis.discrepancy.verdict import Conclusion, Verdict
 from piezo_hysteresis.effects import Arx, BoucWen, Softening
 from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.identify import identify

@@ -29,9 +29,10 @@ from ...identification.records.noise_floor import floors, noise_floors, stroke
 from ...model.model import Model
 from ...model.provenance import data_hash, with_stated_error
 from ...record import Experiment, Notice, Record
-from ..diagnosis import Conclusion, Diagnosis
+from ..diagnosis import Diagnosis
 from ..gap import measure_gap
 from ..residual.localise import located
+from ..verdict import Conclusion
 from .change_kinds import KINDS, LEAVES, ParameterChange
 from .parameter_changes import find_change, is_unchanged
 from .signatures import DRIFT_TIME, creep_numbers, loop_numbers, shaped_model

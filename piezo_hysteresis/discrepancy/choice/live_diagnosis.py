@@ -26,7 +26,8 @@ from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.phases import ProtocolPhase
 from ...record import Experiment
 from ..diagnose import diagnose
-from ..diagnosis import Diagnosis, Verdict
+from ..diagnosis import Diagnosis
+from ..verdict import Verdict
 from .probabilities import NONE_OF_THESE, NOTHING, probabilities
 from .rivals import rivals_of
 from .still_hidden import still_hidden

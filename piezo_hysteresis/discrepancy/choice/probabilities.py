@@ -26,10 +26,10 @@ import numpy as np
 import scipy
 
 from ...identification.fit.form_uncertainty import PIECES
-from ..diagnosis import Diagnosis, Verdict
+from ..diagnosis import Diagnosis
 from ..search.cross_validation import ADEQUATE, Score
 from ..search.selection_result import Step
-from ..verdict import FAR, NAMED, NAMED_FAR
+from ..verdict import FAR, NAMED, NAMED_FAR, Verdict
 from .time_to_decide import ONE_RECORD
 
 NOTHING, NONE_OF_THESE = "nothing", "none of these"

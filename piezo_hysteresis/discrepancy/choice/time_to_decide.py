@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from ...blocks.block import Array
 from ...errors import DivergenceError
 from ...identification.fit.fit import gauge
 from ...identification.fit.form_uncertainty import PIECES
@@ -30,7 +31,7 @@ from ...identification.fit.normal_equations import grams
 from ...identification.protocol.phases import ProtocolPhase
 from ...model.model import Model
 from ...record import Record
-from ..search.candidates import FittedCandidate, adjusted_numbers, weighted_sum
+from ..search.candidates import FittedCandidate, adjusted_numbers
 from ..search.training_data import TrainingData
 
 ERROR_RATE, LONGEST = 0.005, 600.0
@@ -165,7 +166,8 @@ def distances(
     """
     free = adjusted_numbers(first, training_data)
     directions = gauge(first, free)
-    known = weighted_sum(grams(first, training_data.records, free, training_data.nuisance), training_data.floors)
+    products = grams(first, training_data.records, free, training_data.nuisance)
+    known: Array = sum(g.matrix / (g.size * f * f) for g, f in zip(products, training_data.floors, strict=True))
     prior = directions.T @ known[:-1, :-1] @ directions
     floor = float(np.min(training_data.floors))
     found = {}

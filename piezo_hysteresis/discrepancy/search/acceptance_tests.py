@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from ...effects import AmplifierSaturation
-from .candidate_refits import LATER, LEAST_GAIN
+from .candidate_refits import LEAST_GAIN
 from .candidates import FittedCandidate
 from .cross_validation import Score
 from .refit import without
@@ -39,7 +39,7 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
         return Rejection(
             best.name, f"{100 * left:.0f} % of the excess error remains, and {100 * KEEPS:.0f} % is allowed"
         )
-    alone = without(best, LATER)
+    alone = without(best)
     owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
     if owed < LEAST_GAIN:
         return Rejection(best.name, f"it gains only {owed:.2f} over the model that was refitted without it")

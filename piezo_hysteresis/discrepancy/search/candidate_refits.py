@@ -24,10 +24,10 @@ from typing import TypeVar
 from ...effects.effect import ChainPosition
 from ...identification.fit.fit import Progress
 from ...model.model import Model
-from .candidates import Candidate, FittedCandidate
+from .candidates import BY_COST, Candidate, FittedCandidate
 from .cross_validation import ADEQUATE, Score
 from .execution.cores import on_cores
-from .refit import from_all_starts, proceed, refit, restart
+from .refit import FIRST, LATER, from_all_starts, proceed, refit, restart
 
 LEAST_GAIN = 0.15
 """Smallest gain in mean ln max(1, R²) for which an effect is accepted."""
@@ -39,8 +39,6 @@ RESTARTS = 4
 """Largest number of refits of a candidate from other start values."""
 WORTHWHILE = 0.8
 """Ratio of the new to the old cost above which a refit is not repeated."""
-FIRST, LATER = 3, 9
-"""Number of linearisations of a refit, before and after candidates far behind are dropped."""
 FEWEST_STARTS = 3
 """Number of starts from which an effect of the loop has several minima."""
 TIE = 0.02
@@ -58,7 +56,7 @@ def refit_candidates(
     progress("refits of the candidates", 0.2)
     first = partial(refit, model, max_iterations=FIRST)
     refits = _collected(first, candidates, lambda c, found: not any(_is_far_behind(c, r, before) for r in found))
-    refits.sort(key=_cost)
+    refits.sort(key=BY_COST)
     progress("new estimate of the dynamics", 0.6)
     best = refits[:AGAIN]
     anew = _collected(_anew, best, lambda c, found: not (found and _is_far_behind(c, found[0], before)))
@@ -84,13 +82,13 @@ def _collected(
 def _replaced(before: list[FittedCandidate], after: list[FittedCandidate]) -> list[FittedCandidate]:
     """The refits before, with those of the same effects after, best first."""
     names = {c.name for c in after}
-    return sorted([*after, *(c for c in before if c.name not in names)], key=_cost)
+    return sorted([*after, *(c for c in before if c.name not in names)], key=BY_COST)
 
 
 def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
     """Refits of effects of the drive and the loop that the dynamics have absorbed, so that no score test shows them."""
     bending = [c for c in candidates if _bends_dynamics(c)]
-    return _collected(partial(_settled, partial(from_all_starts, model, max_iterations=FIRST), before), bending)
+    return _collected(partial(_settled, partial(from_all_starts, model), before), bending)
 
 
 def _settled(fit: Fitter, before: Score, candidate: Candidate) -> FittedCandidate | None:
@@ -130,15 +128,11 @@ def _is_close(candidate: Candidate, best: FittedCandidate, before: Score) -> boo
     return candidate.score.cost < best.score.cost + CLOSE * max(before.cost - best.score.cost, LEAST_GAIN)
 
 
-def _cost(candidate: Candidate) -> float:
-    return candidate.score.cost
-
-
 def settled(candidate: FittedCandidate, before: Score) -> FittedCandidate:
     """The converged refit, repeated with new dynamics while this removes much of the remaining cost."""
     for _ in range(RESTARTS):
         cost = candidate.fit.cost
-        candidate = proceed(candidate, LATER)
+        candidate = proceed(candidate)
         if candidate.score.excess <= ADEQUATE or before.cost - candidate.score.cost < 0.5 * LEAST_GAIN:
             break
         candidate = restart(candidate, LATER)

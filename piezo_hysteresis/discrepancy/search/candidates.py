@@ -25,6 +25,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import attrgetter
 
 import numpy as np
 
@@ -38,6 +39,9 @@ from ...model.model import Model
 from .cross_validation import Score, cross_validate, indispensable
 from .execution.cores import on_cores
 from .training_data import TrainingData
+
+BY_COST = attrgetter("score.cost")
+"""Key that sorts candidates and fitted models, the best one first."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -149,7 +153,7 @@ def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Eff
         for candidate in found:
             if candidate.name not in best or candidate.score.cost < best[candidate.name].score.cost:
                 best[candidate.name] = candidate
-    return sorted(best.values(), key=lambda c: c.score.cost)
+    return sorted(best.values(), key=BY_COST)
 
 
 def _screen_group(model: Model, training_data: TrainingData, base: list[str], group: list[Effect]) -> list[Candidate]:
@@ -220,9 +224,3 @@ def _scored(
         score = _score(training_data, products, part, room_of(model, names, part))
         found.append(Candidate(effect, training_data, score))
     return found
-
-
-def weighted_sum(products: Sequence[Gram], floors: Array) -> Array:
-    """Sum of the inner products, each record weighted by its size and floor."""
-    total: Array = sum(g.matrix / (g.size * f * f) for g, f in zip(products, floors, strict=True))
-    return total

@@ -31,7 +31,7 @@ from ...identification.steps.dynamics import Dynamics, identify_arx
 from ...identification.steps.linear_start import FEW_ITERATIONS, ITERATIONS, form_of, hysteresis_signals, with_dynamics
 from ...identification.steps.modes import identify_modes
 from ...model.model import Model
-from .candidates import Candidate, FittedCandidate, adjusted_numbers, score_model
+from .candidates import BY_COST, Candidate, FittedCandidate, adjusted_numbers, score_model
 from .cross_validation import Score
 from .execution.cores import on_cores
 from .execution.time_limit import check_time
@@ -41,6 +41,8 @@ LINEAR = ("lag", "dynamics")
 """Families of effects that dynamics of sufficient order can contain."""
 TOLERANCE = 1e-3
 """Relative decrease of the cost at convergence of a refit."""
+FIRST, LATER = 3, 9
+"""Number of linearisations of a refit, before and after candidates far behind are dropped."""
 LAST, PRECISE = 25, 1e-4
 """Number of linearisations of a last fit, and relative decrease of the cost at convergence."""
 MODAL_GAIN = 0.1
@@ -95,11 +97,11 @@ def refit(model: Model, candidate: Candidate, max_iterations: int) -> FittedCand
     return _refitted(model.with_effect(candidate.effect), candidate, max_iterations)
 
 
-def proceed(candidate: FittedCandidate, max_iterations: int) -> FittedCandidate:
+def proceed(candidate: FittedCandidate) -> FittedCandidate:
     """Continue a refit from where it stopped; a refit that has converged is returned as it is."""
     if candidate.fit.converged:
         return candidate
-    return _refitted(candidate.fit.model, candidate, max_iterations) or candidate
+    return _refitted(candidate.fit.model, candidate, LATER) or candidate
 
 
 def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
@@ -125,7 +127,7 @@ def restart(candidate: FittedCandidate, max_iterations: int) -> FittedCandidate:
     return candidate if anew is None or anew.fit.cost >= candidate.fit.cost else anew
 
 
-def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
+def from_all_starts(model: Model, candidate: Candidate) -> FittedCandidate | None:
     """Refit of the model with the candidate from the best start of its effect; None if all starts diverge.
 
     Every start is judged with newly estimated dynamics after few iterations. Noise that a limit distorts changes the
@@ -133,16 +135,12 @@ def from_all_starts(model: Model, candidate: Candidate, max_iterations: int) -> 
     """
     starts = type(candidate.effect).starts(candidate.training_data.extent)
     found = (_behind_anew(model.with_effect(start), candidate.training_data, (FEW_ITERATIONS,)) for start in starts)
-    return _from_best(found, candidate, max_iterations)
+    return _from_best(found, candidate, FIRST)
 
 
 def _from_best(starts: Iterable[Fitted | None], candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
-    best = min(filter(None, starts), key=_cost, default=None)
+    best = min(filter(None, starts), key=BY_COST, default=None)
     return None if best is None else _refitted(best.model, candidate, max_iterations)
-
-
-def _cost(fitted: Fitted) -> float:
-    return fitted.score.cost
 
 
 def _behind_anew(
@@ -167,7 +165,7 @@ def _behind_anew(
         for iterations in choices:
             with suppress(*FAILURES):
                 found.append(behind(identify_arx(signals, *form_of(model), iterations)))
-        best = min(found, key=_cost, default=None)
+        best = min(found, key=BY_COST, default=None)
         if ITERATIONS in choices:
             modes = behind(identify_modes(signals, *form_of(model), ITERATIONS))
             if best is None or modes.score.cost < best.score.cost - MODAL_GAIN:
@@ -175,7 +173,7 @@ def _behind_anew(
     return best
 
 
-def without(candidate: FittedCandidate, max_iterations: int) -> Fitted | None:
+def without(candidate: FittedCandidate) -> Fitted | None:
     """The candidate's model refitted without its effect; None if this diverges.
 
     The gain of this model over the model before is due to dynamics and hysteresis, and not to the effect. An effect
@@ -190,9 +188,9 @@ def without(candidate: FittedCandidate, max_iterations: int) -> Fitted | None:
     fits = list[Fitted]()
     for start in filter(None, starts):
         with suppress(*FAILURES):
-            fitted = joint(start, training_data, max_iterations).model
+            fitted = joint(start, training_data, LATER).model
             fits.append(Fitted(fitted, score_model(fitted, training_data)))
-    return min(fits, key=_cost, default=None)
+    return min(fits, key=BY_COST, default=None)
 
 
 def _absorbed(model: Model, extended: Model, training_data: TrainingData) -> Model | None:

@@ -35,7 +35,7 @@ from .candidate_refits import (
     refits_of_twins,
     simplest,
 )
-from .candidates import FittedCandidate, screen
+from .candidates import BY_COST, FittedCandidate, screen
 from .cross_validation import ADEQUATE, Score
 from .execution.time_limit import TimeSpentError
 from .selection_result import Rejection, Selection, Step
@@ -135,8 +135,8 @@ def _turn(
 
 def _best_of_each(refits: list[FittedCandidate]) -> list[FittedCandidate]:
     """The best refit of every effect, best first; a limit that bends all along the drive is a curve and not a limit."""
-    worst_first = sorted((c for c in refits if not bends_all_along(c)), key=lambda c: -c.score.cost)
-    return sorted({c.name: c for c in worst_first}.values(), key=lambda c: c.score.cost)
+    worst_first = sorted((c for c in refits if not bends_all_along(c)), key=BY_COST, reverse=True)
+    return sorted({c.name: c for c in worst_first}.values(), key=BY_COST)
 
 
 def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> Rejection | None:

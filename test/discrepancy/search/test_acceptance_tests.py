@@ -60,7 +60,7 @@ def scored(*ratios):
 def test_an_effect_must_gain_also_over_the_model_that_was_refitted_without_it(monkeypatch, before, alone, reason):
     drift = fitted(GainDrift(g=0.05, tau=600.0), ("gain_drift.g", "gain_drift.tau"), np.eye(2), null=0.5)
     refitted = alone and Fitted(drift.fit.model, scored(*alone))
-    monkeypatch.setattr(acceptance_tests, "without", lambda candidate, iterations: refitted)
+    monkeypatch.setattr(acceptance_tests, "without", lambda candidate: refitted)
     rejection = first_rejection(replace(drift, score=scored(1.0, 1.0)), scored(*before))
     assert rejection is None if reason is None else (rejection.name == "gain_drift" and reason in rejection.reason)
 

@@ -55,5 +55,5 @@ def test_a_loop_that_lost_its_width_is_started_again():
     bent = STAGE.with_hysteresis(NARROW)
     found = refit(bent, Candidate(SLEW_LIMIT, data, score_model(bent, data)), 9)
     assert found is not None
-    assert proceed(found, 9).score.excess > 10.0 * ADEQUATE
+    assert proceed(found).score.excess > 10.0 * ADEQUATE
     assert restart(found, 9).score.excess < ADEQUATE
