@@ -47,8 +47,6 @@ HOPELESS = 0.02
 """Linearised gain below which an effect that is not among the first two is not refitted."""
 MOST = 3
 """Largest number of effects."""
-NO_GAIN = 0.005
-"""Smallest gain in cross-validation that is stated as a number: below it, it would read 0.00."""
 
 
 def select(
@@ -128,8 +126,7 @@ def _turn(
     others = [c for c in screened if all(c.name != r.name for r in refits)]
     for other in others:
         most = max(0.0, before.cost - other.score.cost)
-        gains = f"it lowers mean ln R² by at most {most:.2f}" if most >= NO_GAIN else "it does not reduce the error"
-        rejected.append(Rejection(other.name, f"in cross-validation {gains}"))
+        rejected.append(Rejection(other.name, f"in cross-validation it lowers mean ln R² by at most {most:.2f}"))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected), (*refits, *others))
 
 
