@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`diagnose`: a loop over the passes of `passes`, up to the first one that returns a diagnosis."""
+"""`diagnose`: prepares the records, compares them with a given model, and answers from few records or from many."""
 
 from __future__ import annotations
 
@@ -27,17 +27,25 @@ from ..errors import DivergenceError, IdentificationError, ParameterError
 from ..identification.fit.fit import Progress
 from ..identification.inputs import experiment_of
 from ..identification.one_core import on_one_core
+from ..identification.records.comparable import comparable
+from ..identification.records.roles import roles_of
 from ..model.model import Model
 from ..record import Notice, Record
-from .changes.same_stage import UNCHANGED
+from .changes.same_stage import UNCHANGED, same_stage
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
-from .passes import PASSES
+from .excitation_check import check_motion, moves
+from .many_records import diagnose_many
+from .residual.sampling import is_faster, resampled
 from .search.execution.cores import using_cores
-from .verdict import Conclusion, Verdict
+from .single_record import diagnose_few
+from .unnamed.correction import without_corrections
+from .verdict import FEWEST_RECORDS, Conclusion, Verdict
 
 GIVEN_DIVERGES = "given_model_diverges"
 """Kind of the notice that the given model is not used."""
+RESAMPLED = "resampled"
+"""Kind of the notice about records that are faster than the given model."""
 
 
 @on_one_core
@@ -101,19 +109,82 @@ def diagnose(
     state = DiagnosisState(recorded, model, effects, progress, end, explicit_step, given=recorded)
     # diverging trials have a large cost
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"), using_cores(cores):
-        for run in PASSES:
-            try:
-                found = run(state)
-            except (DivergenceError, IdentificationError) as error:
-                cause = error.__cause__ or error  # a fit from diverging start values
-                if state.model is None or not isinstance(cause, DivergenceError):
-                    raise
-                state = _without_given_model(state, cause)
-                found = run(state)
-            if isinstance(found, Diagnosis):
-                return compared_with_given(found)
-            state = found
-    raise IdentificationError("diagnose: got no answer from the last pass, expected a diagnosis")
+        state = prepare(state)
+        return compared_with_given(_without_verdict(state) or _answer(_resampled(state)))
+
+
+def prepare(state: DiagnosisState) -> DiagnosisState:
+    """Remove the noise of a measured voltage, and cut records that begin in an unknown state, as `identify` does."""
+    experiment, notices = comparable(state.experiment)
+    return replace(state, experiment=experiment.noting(*notices)) if notices else state
+
+
+def _without_verdict(state: DiagnosisState) -> Diagnosis | None:
+    """The answer "unknown" if the data are damaged; an IdentificationError if nothing moves in them."""
+    experiment, model = state.experiment, state.model
+    if not any(moves(record) for record in experiment):
+        raise IdentificationError("diagnose: the drive does not move in any record; expected loops, steps or noise")
+    severe = [n for n in experiment.notices if n.severe]
+    if not severe:
+        check_motion("diagnose", [experiment[i] for i in state.moving])
+        return None
+    reason = f"No verdict is possible, because of the data: {severe[0].message}."
+    return Diagnosis(Conclusion.INSUFFICIENT_DATA, reason, model, model, experiment)
+
+
+def _resampled(state: DiagnosisState) -> DiagnosisState:
+    """Convert records that are faster than the given model, which holds at its sample period and at longer ones."""
+    if state.model is None:
+        return state
+    period, experiment = state.model.sample_period, state.experiment
+    fast = [r.sample_period for r in experiment if is_faster(r, period)]
+    if not fast:
+        return state
+    message = (
+        f"the given model holds from a sample period of {period:g} s on; "
+        f"records with samples every {min(fast):g} s were converted to it"
+    )
+    records = tuple(resampled(r, period) if is_faster(r, period) else r for r in experiment.records)
+    return replace(state, experiment=replace(experiment, records=records).noting(Notice(RESAMPLED, message)))
+
+
+def _answer(state: DiagnosisState) -> Diagnosis:
+    """The answer; if the given model diverges on the records, it is that without a given model."""
+    try:
+        found = compare_with_given_model(state)
+        if isinstance(found, Diagnosis):
+            return found
+        state = found
+        return _searched(state)
+    except (DivergenceError, IdentificationError) as error:
+        cause = error.__cause__ or error  # a fit from diverging start values
+        if state.model is None or not isinstance(cause, DivergenceError):
+            raise
+        return _searched(_without_given_model(state, cause))
+
+
+def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosis:
+    """The changed parameter, if the given model explains the records apart from this change; else the state with it."""
+    model = state.model
+    if model is None:
+        return state
+    found = same_stage(
+        state.experiment,
+        model,
+        state.moving,
+        lambda part: state.progress("changes of the given model", 0.1 * part),
+        state.given,
+    )
+    if isinstance(found, Notice):
+        state, found = replace(state, experiment=state.experiment.noting(found)), None
+    return found or replace(state, model=without_corrections(model))
+
+
+def _searched(state: DiagnosisState) -> Diagnosis:
+    """The answer of the search: with fewer than four records, or if none is broadband, from the chosen structure."""
+    needs_structure = state.model is None and not roles_of(state.experiment).broadband
+    is_many = len(state.moving) >= FEWEST_RECORDS and not needs_structure
+    return diagnose_many(state) if is_many else diagnose_few(state)
 
 
 def _without_given_model(state: DiagnosisState, error: DivergenceError) -> DiagnosisState:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`DiagnosisState`: the experiment and the options of a diagnosis, between two of its passes."""
+"""`DiagnosisState`: the experiment and the options of a diagnosis, between two of its steps."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ IDLE = ("idle", "hold", CONDITIONING)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DiagnosisState:
-    """The experiment and the options of a diagnosis, between two of its passes.
+    """The experiment and the options of a diagnosis, between two of its steps.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class DiagnosisState:
     explicit_step : bool
         Whether the error of an explicit step of the loop may be subtracted.
     given : Experiment or None
-        The experiment as it was recorded, before the passes prepared it.
+        The experiment as it was recorded, before it was prepared.
     """
 
     experiment: Experiment

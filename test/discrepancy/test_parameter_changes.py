@@ -26,9 +26,8 @@ from piezo_hysteresis.discrepancy import Conclusion, Diagnosis, Verdict, diagnos
 from piezo_hysteresis.discrepancy.changes.parameter_changes import find_change, is_unchanged
 from piezo_hysteresis.discrepancy.changes.recalibration import recalibrate
 from piezo_hysteresis.discrepancy.changes.same_stage import changed_model, sentence_of
-from piezo_hysteresis.discrepancy.diagnose import compared_with_given
+from piezo_hysteresis.discrepancy.diagnose import compare_with_given_model, compared_with_given, prepare
 from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
-from piezo_hysteresis.discrepancy.passes import compare_with_given_model, prepare
 from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.free_run_error import errors, zero_per_phase
 from piezo_hysteresis.identification.identify import identify

@@ -17,13 +17,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
 
 from piezo_hysteresis.blocks.block import Block
 from piezo_hysteresis.blocks.relaxation import RelaxationBlock
-from piezo_hysteresis.discrepancy import passes
+from piezo_hysteresis.discrepancy.diagnose import compare_with_given_model
+from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
 from piezo_hysteresis.discrepancy.search.baseline_setup import BaselineSetup
 from piezo_hysteresis.discrepancy.search.candidates import score_baseline
 from piezo_hysteresis.discrepancy.search.refit import LAST, joint
@@ -177,10 +179,11 @@ def test_a_correction_is_never_part_of_naming(monkeypatch: pytest.MonkeyPatch) -
     assert not any(issubclass(effect, UnnamedCorrection) for effect in CATALOGUE)
     corrected = PLAIN.with_effect(hump())
     assert [e.name for e in without_corrections(corrected).effects] == [e.name for e in PLAIN.effects]
-    monkeypatch.setattr(passes, "same_stage", lambda *_: None)
+    module = import_module("piezo_hysteresis.discrepancy.diagnose")  # of the same name as its function
+    monkeypatch.setattr(module, "same_stage", lambda *_: None)
     record = played(PLAIN, 4.0, 5.0, 0)
-    state = passes.DiagnosisState(Experiment((record,)), corrected, CATALOGUE, lambda *_: None)
-    assert hump().name not in passes.compare_with_given_model(state).model
+    state = DiagnosisState(Experiment((record,)), corrected, CATALOGUE, lambda *_: None)
+    assert hump().name not in compare_with_given_model(state).model
 
 
 def test_records_of_one_rate_cannot_accept_a_correction(of_position: BaselineSetup) -> None:

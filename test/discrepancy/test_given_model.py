@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Passes of a diagnosis that prepare the records."""
+"""How a diagnosis prepares the records and uses a given model."""
 
 from dataclasses import replace
 
@@ -21,8 +21,7 @@ import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy import diagnose
-from piezo_hysteresis.discrepancy.diagnose import GIVEN_DIVERGES
-from piezo_hysteresis.discrepancy.passes import RESAMPLED
+from piezo_hysteresis.discrepancy.diagnose import GIVEN_DIVERGES, RESAMPLED
 from piezo_hysteresis.discrepancy.verdict import Conclusion, Verdict
 from piezo_hysteresis.effects import Arx, BoucWen, Softening
 from piezo_hysteresis.errors import DivergenceError
