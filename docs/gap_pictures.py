@@ -44,7 +44,7 @@ from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate, scre
 from piezo_hysteresis.discrepancy.search.cross_validation import ADEQUATE
 from piezo_hysteresis.discrepancy.search.refit import without
 from piezo_hysteresis.discrepancy.search.selection import REFITS
-from piezo_hysteresis.discrepancy.search.test_records import choose_test_records
+from piezo_hysteresis.discrepancy.search.training_data import choose_test_records
 from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
 from piezo_hysteresis.identification.protocol import protocol

@@ -52,7 +52,7 @@ from .search.refit import LAST, joint
 from .search.selection import select
 from .search.selection_result import Selection, Step, explained
 from .search.structure_steps import structure_steps
-from .search.test_records import choose_test_records
+from .search.training_data import choose_test_records
 from .verdict import FEWEST_RECORDS, MORE_MAY_BE_MISSING, Conclusion, conclusion_of, is_explained
 
 SHARP = 1e-6

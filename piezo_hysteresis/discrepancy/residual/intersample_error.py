@@ -25,9 +25,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...blocks.block import Array
+from ...effects import Arx
 from ...model.model import Model
 from ...record import Record
-from .quick_dynamics import quick_dynamics
 
 PARTS = 16
 """Largest number of parts into which a sample is divided."""
@@ -39,6 +39,10 @@ TINY = 1e-12
 """Share of the drive range below which the drive counts as constant, and shortest ramp as a share of a sample."""
 ITS_SIZE = (0.7, 1.3)
 """Range of the fitted factor of a correction that explains the residual (ideal: 1)."""
+SMALL = 0.1
+"""Largest share of the response of a relaxation that counts as creep; that of a slow amplifier is larger."""
+REAL = 1e-9
+"""Imaginary part below which a root is real."""
 
 
 def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
@@ -76,6 +80,43 @@ def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
         changes.append([y.reshape(x.size, -1).mean(axis=1) - x for x, y in pairs])
     off = [r.displacement - y for r, y in zip(records, straight, strict=True)]
     return [chosen_correction(e, a, b) for e, a, b in zip(off, *changes, strict=True)]
+
+
+def quick_dynamics(model: Model, longest: float) -> Model:
+    """The model without relaxations of G slower than `longest` [s], with the same dc gain.
+
+    Parameters
+    ----------
+    model : Model
+        Any model; without `arx` it is returned unchanged.
+    longest : float
+        Time constant from which a real pole counts as slow [s].
+    """
+    if Arx.name not in model:
+        return model
+    arx = model[Arx.name]
+    a, b = np.append(1.0, arx.array("a")), arx.array("b")
+    poles, zeros = np.roots(a), np.roots(b)
+    slow = [p.real for p in poles if abs(p.imag) < REAL and np.exp(-model.sample_period / longest) < p.real < 1.0]
+    removed = 0
+    for pole in sorted(slow, reverse=True):
+        beside = [k for k, q in enumerate(zeros) if abs(q.imag) < REAL and _share(pole, q.real) < SMALL]
+        if beside:
+            zeros = np.delete(zeros, min(beside, key=lambda k: abs(zeros[k] - pole)))
+            poles = np.delete(poles, np.argmin(np.abs(poles - pole)))
+            removed += 1
+    if not removed or b.sum() == 0.0:
+        return model
+    unused = np.zeros(removed)
+    lean_a, lean_b = np.append(np.poly(poles).real, unused), np.append(np.poly(zeros).real, unused)
+    lean_b = np.append(np.zeros(b.size - lean_b.size), lean_b)  # leading zeros of b are a delay
+    lean_b *= b.sum() / a.sum() * lean_a.sum() / lean_b.sum()
+    return model.with_effect(arx.with_values(a=tuple(lean_a[1:].tolist()), b=tuple(lean_b.tolist())))
+
+
+def _share(pole: float, zero: float) -> float:
+    """Delayed share of the final response of (1 − zero z⁻¹)/(1 − pole z⁻¹)."""
+    return abs(1.0 - (1.0 - pole) / (1.0 - zero)) if zero != 1.0 else np.inf
 
 
 def chosen_correction(residual: Array, gradual: Array, abrupt: Array) -> Array:

@@ -43,8 +43,7 @@ from .cross_validation import ADEQUATE, Score
 from .execution.cores import start_helpers
 from .refit import FAILURES, LAST, PRECISE, joint
 from .selection_result import Selection
-from .test_records import choose_test_records
-from .training_data import TrainingData
+from .training_data import TrainingData, choose_test_records
 
 SEARCHED, FITTED = 6_000, 50_000
 """Largest number of samples of a record, approximately, in the search and in the last fit."""

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`TrainingData`: the records for fitting and choosing, and the ranges that they cover."""
+"""`TrainingData`: the records for fitting and choosing, and their ranges; `choose_test_records` picks the others."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,7 +28,10 @@ from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.excitation_content import excitation_content
 from ...model.model import Model
 from ...record import Record
+from ..excitation_check import moves
 
+PER_TEST_RECORD = 3
+"""Number of records of a kind per test record."""
 LEVELS_APART = 0.05
 """Smallest difference between two initial levels of records, as a share of the voltage range."""
 MOST_PEAKS = 3
@@ -130,3 +133,31 @@ def peaks_of(records: Sequence[Record], left: Sequence[Array]) -> tuple[float, .
     ratio = np.where(reach > MOVES * noise, np.maximum(power - noise, 0.0) / reach, 0.0)
     tops = 1 + np.flatnonzero((ratio[1:-1] > ratio[:-2]) & (ratio[1:-1] >= ratio[2:]))
     return tuple(float(frequency[k]) for k in tops[np.argsort(-ratio[tops])][:MOST_PEAKS])
+
+
+def choose_test_records(records: Sequence[Record], usable: Collection[int]) -> tuple[int, ...]:
+    """Indices of the test records.
+
+    If a kind of phase has at least three realisations, one in three is a test record, from the middle of the list, so
+    that the extremes of amplitude and frequency are fitted. All phases named ``validation`` are test records, unless
+    the drive moves in no other record.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        The experiment.
+    usable : collection of int
+        Indices that may be taken.
+    """
+    kinds: dict[str, list[int]] = {}
+    for index in usable:
+        kinds.setdefault(records[index].phase.split("_")[0], []).append(index)
+    validation = kinds.pop("validation", [])
+    if not any(moves(records[i]) for members in kinds.values() for i in members):
+        return ()
+    chosen = [
+        i
+        for members in kinds.values()
+        for i in members[PER_TEST_RECORD // 2 :: PER_TEST_RECORD][: len(members) // PER_TEST_RECORD]
+    ]
+    return tuple(sorted(chosen + validation))
