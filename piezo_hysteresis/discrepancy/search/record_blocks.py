@@ -38,52 +38,28 @@ FEWEST = 256
 def training_data_of(
     records: Sequence[Record], fitted: Collection[int], noise: Array, least: Array, model: Model
 ) -> TrainingData:
-    """The blocks of the records `fitted`, with their floors and what is free in each record.
+    """The blocks of the records `fitted`, a leading jump apart, with what is free in each record.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        In order.
-    fitted : collection of int
-        Indices of the records to fit; the others only determine the state of the stage.
-    noise, least : (r,) ndarray
-        Noise and floor of every record [m].
-    model : Model
-        Model with which the fit begins.
+    `noise` and `least` are noise and floor of every record [m], shape (r,). Records that only set the state stay whole
+    and have an infinite floor; others are left out. The ranges are in the units of `model`.
     """
-    blocks, origin = blocks_of(records, fitted)
-    weights, quiet = (np.array([np.inf if k is None else sizes[k] for k in origin]) for sizes in (least, noise))
-    jumps = tuple(i for i, b in enumerate(blocks) if not b.continues and step_length(records[origin[i] or 0]) == b.size)
-    extent = Extent.of([records[i] for i in fitted], model.voltage_scale, model.displacement_scale)
-    free = Nuisance(offset=sum(not r.continues for r in records) > 1)
-    return TrainingData(tuple(blocks), weights, free, extent, jumps, noise=quiet)
-
-
-def blocks_of(records: Sequence[Record], used: Collection[int]) -> tuple[list[Record], list[int | None]]:
-    """Blocks of the records `used`, a leading jump apart, and the record of each (None: it only sets the state).
-
-    Records that none of them continues are left out.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        Records in order.
-    used : collection of int
-        Indices of the records to cut.
-    """
-    length = max(FEWEST, sum(records[i].size for i in used) // BLOCKS)
-    blocks: list[Record] = []
-    origin: list[int | None] = []
-    for index in with_conditioning(records, used):
+    length = max(FEWEST, sum(records[i].size for i in fitted) // BLOCKS)
+    blocks, origin, jumps = list[Record](), list[int | None](), list[int]()
+    for index in with_conditioning(records, fitted):
         record = records[index]
-        if index not in used:
+        if index not in fitted:
             blocks.append(record)
             origin.append(None)
             continue
         step = 0 if record.continues else step_length(record)
+        if step:
+            jumps.append(len(blocks))
         count = max(1, round((record.size - step) / length))
         edges = {step, *(step + round(k * (record.size - step) / count) for k in range(1, count))}
         cuts = record.split(*sorted(edges - {0}))
         blocks += cuts
         origin += [index] * len(cuts)
-    return blocks, origin
+    weights, quiet = (np.array([np.inf if k is None else sizes[k] for k in origin]) for sizes in (least, noise))
+    extent = Extent.of([records[i] for i in fitted], model.voltage_scale, model.displacement_scale)
+    free = Nuisance(offset=sum(not r.continues for r in records) > 1)
+    return TrainingData(tuple(blocks), weights, free, extent, tuple(jumps), noise=quiet)
