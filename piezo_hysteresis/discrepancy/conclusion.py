@@ -55,25 +55,13 @@ def concluded(
     where: tuple[ResidualShare, ...],
     selection: Selection,
     progress: Progress,
-    given: Model | None = None,
+    given: Model | None,
 ) -> Diagnosis:
     """The last fits, the gap on the test records, the verdict, and the next experiment.
 
-    Parameters
-    ----------
-    experiment : Experiment
-        Experiment that was compared with the model.
-    setup : BaselineSetup
-        Floors, records and baseline.
-    where : tuple of ResidualShare
-        Distribution of the residual of the baseline.
-    selection : Selection
-        Result of the search.
-    progress : callable
-        Called with a message and the fraction done.
-    given : Model, optional
-        Model that the user gave. The gap before is its own error, not that after a joint fit. It stays the model where
-        no effect is named and the joint fit predicts the test records worse.
+    `where` is the distribution of the residual of the baseline. The gap before is the own error of a `given` model, not
+    that after a joint fit. It stays the model where no effect is named and the joint fit predicts the test records
+    worse.
     """
     progress("gap", 0.85)
     named = is_explained(selection)
@@ -118,18 +106,42 @@ def concluded(
                 gap = measure_gap((given, given), setup.records, chosen, least, setup.span, zeros, gap.unseen)
     is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
     found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
+    missing = missing_excitation([setup.records[i] for i in setup.usable], found)
+    models = first.stated_model if given is None else given, delivered
+    noted, said = experiment.noting(*missing), (conclusion, reason)
+    answer = answered(noted, said, models, fit, gap, setup.span, selection, setup.training_data, where)
+    return replace(answer, correction=best_correction(final.model, setup)) if is_unexplained else answer
+
+
+def answered(
+    experiment: Experiment,
+    said: tuple[Conclusion, str],
+    models: tuple[Model, Model],
+    fit: Fit | None,
+    gap: Gap,
+    span: float,
+    selection: Selection,
+    training_data: TrainingData,
+    where: tuple[ResidualShare, ...],
+) -> Diagnosis:
+    """The answer of a search, with the next experiment.
+
+    `said` is the conclusion and its reason. The models before and after state their own errors, in a range of `span`
+    [m]: the second one that of live prediction.
+    """
+    conclusion, reason = said
+    before, after = models
     return Diagnosis(
         conclusion=conclusion,
         reason=reason,
-        model=with_stated_error(delivered, gap.live, setup.span),
-        baseline=with_stated_error(first.stated_model if given is None else given, gap.before, setup.span),
+        model=with_stated_error(after, gap.live, span),
+        baseline=with_stated_error(before, gap.before, span),
         selection=selection,
         fit=fit,
         where=where,
         gap=gap,
-        next_experiment=best_next_experiment(selection, setup.training_data),
-        experiment=experiment.noting(*missing_excitation([setup.records[i] for i in setup.usable], found)),
-        correction=best_correction(final.model, setup) if is_unexplained else None,
+        next_experiment=best_next_experiment(selection, training_data),
+        experiment=experiment,
     )
 
 

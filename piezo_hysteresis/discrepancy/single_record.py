@@ -30,16 +30,16 @@ from ..identification.fit.fit import Fit
 from ..identification.fit.normal_equations import Nuisance
 from ..identification.identify import identify
 from ..identification.records.conditioning import with_conditioning
-from ..identification.records.noise_floor import floors, noise_floors, noise_of_averages, stroke
+from ..identification.records.noise_floor import floors, noise_floors, noise_of_averages
 from ..identification.structure.left_out import has_several_drives, score_left_out
 from ..model.model import Model
-from ..model.provenance import provenance, with_stated_error
+from ..model.provenance import provenance
 from ..record import Notice, Record
+from .conclusion import answered
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .excitation_check import missing_excitation
 from .gap import Gap, measure_gap
-from .next_experiment import best_next_experiment
 from .residual.localise import located
 from .residual.sampling import shortened
 from .search.baseline import as_conditioning, with_zero
@@ -75,10 +75,7 @@ class _Delivered:
 def diagnose_few(state: DiagnosisState) -> Diagnosis:
     """Extend the best model while cross-validation improves, and name the effects that are certain.
 
-    Parameters
-    ----------
-    state : DiagnosisState
-        The prepared records; without a given model, one is identified from them.
+    Without a given model, one is identified from the prepared records.
     """
     experiment, model, used, progress = state.experiment, state.model, state.moving, state.progress
     records = experiment.records
@@ -91,7 +88,7 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
         published = identify(known, held_out=(), progress=lambda word, part: progress(word, 0.1 + 0.1 * part)).model
         found = identify(known, held_out=(), memory=True, progress=lambda w, part: progress(w, 0.2 + 0.3 * part))
     start = found.model if found else published
-    noise = noise_floors(records)
+    noise, span = noise_floors(records), experiment.range
     least = floors(records, noise)
     short = shortened(records, SEARCHED)
     quiet = noise_of_averages(noise, records, short)
@@ -131,23 +128,13 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     progress("gap", 0.9)
     first = model or baseline.model  # the gap of a given model is measured before any refit
     models, nuisances = (first, final.model), (free, replace(final.nuisance, offset=True))
-    gap = measure_gap(models, records, chosen, least.tolist(), stroke(records), nuisances, bool(aside))
+    gap = measure_gap(models, records, chosen, least.tolist(), span, nuisances, bool(aside))
     shown = {s.best.effect.public_name() for s in selection.accepted}
     missing = missing_excitation([records[i] for i in used], shown)
-    conclusion, reason = conclusion_of_few(selection, is_certain, before, gap, len(used), several, missing)
+    said = conclusion_of_few(selection, is_certain, before, gap, len(used), several, missing)
     delivered = replace(final.model, provenance={**final.model.provenance, **provenance(experiment, 0.0, 0.0)})
-    return Diagnosis(
-        conclusion=conclusion,
-        reason=reason,
-        model=with_stated_error(delivered, gap.live, stroke(records)),
-        baseline=with_stated_error(first, gap.before, stroke(records)),
-        selection=selection,
-        fit=final.fit,
-        where=where,
-        gap=gap,
-        next_experiment=best_next_experiment(selection, training_data),
-        experiment=experiment.noting(*missing),
-    )
+    noted, both = experiment.noting(*missing), (first, delivered)
+    return answered(noted, said, both, final.fit, gap, span, selection, training_data, where)
 
 
 def _best(
