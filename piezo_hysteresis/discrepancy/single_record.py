@@ -105,7 +105,9 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     now, score = (found.fit, score_model(start, training_data)) if found else (baseline, before)
     several = has_several_drives(records, fitted)
     if found and found.structure and before.excess > ADEQUATE and several:
-        steps = structure_steps(found, before, training_data, short, short_least.tolist(), fitted)
+        steps = structure_steps(
+            found, found.structure.leads, before, training_data, short, short_least.tolist(), fitted
+        )
     is_certain = bool(steps)
     fitting = [e for e in state.effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
     with ending_at(state.end):

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from functools import reduce
 
@@ -61,42 +61,20 @@ FEW = 8
 """Number of linearisations of an intermediate model, which starts near its optimum."""
 
 
-def decided(found: Identification) -> list[str]:
-    """Effects of the chosen structure that cross-validation clearly requires, largest first.
-
-    A level dependence of plays is certain only if the plays are: the operator may need no such term.
-    """
-    if found.structure is None:
-        return []
-    leads = found.structure.leads
-    certain = [n for n in ORDER if leads.get(n, 0.0) >= LEADS and n in found.model]
-    return [n for n in certain if n != MEMORY.level_term.name or MEMORY.name in certain]
-
-
 def structure_steps(
     found: Identification,
+    leads: Mapping[str, float],
     before: Score,
     training_data: TrainingData,
     records: Sequence[Record],
     floors: Sequence[float],
     fitted: Collection[int],
 ) -> list[Step]:
-    """One accepted step for every certain effect, in the order of their size.
+    """One accepted step for every effect of the chosen structure that cross-validation clearly requires, largest first.
 
-    Parameters
-    ----------
-    found : Identification
-        Identification with a chosen structure.
-    before : Score
-        Score of the published model.
-    training_data : TrainingData
-        Data for the scores.
-    records : sequence of Record
-        Records in order.
-    floors : sequence of float
-        Floor of every record [m].
-    fitted : collection of int
-        Indices of the fitted records.
+    `leads` is the lead of every effect in cross-validation, mean ln R². A level dependence of plays is certain only if
+    the plays are: the operator may need no such term. `before` is the score of the published model; `floors` [m]
+    belongs to `records`, and the indices `fitted` count in them.
     """
 
     def refitted(model: Model) -> Fit:
@@ -116,12 +94,11 @@ def structure_steps(
         scores = [score_left_out(model, records, floors, fitted) for model in (drift.model, found.model)]
         return () if scores[0] - scores[1] >= LEADS else (candidate(ThermalDrift.name, drift),)
 
-    names = decided(found)
+    certain = [n for n in ORDER if leads.get(n, 0.0) >= LEADS and n in found.model]
+    names = [n for n in certain if n != MEMORY.level_term.name or MEMORY.name in certain]
     steps: list[Step] = []
     for k, name in enumerate(names, 1):
         model = reduce(Model.without, names[k:], found.model)
-        if MEMORY.name not in model:
-            model = model.without(MEMORY.level_term.name)
         with suppress(PiezoError):
             best = candidate(name, refitted(model) if names[k:] else found.fit)
             steps.append(Step(before, best, True, rivals(name), ()))
