@@ -125,12 +125,9 @@ def drive_period(voltage: Array) -> int | None:
     Neighbouring samples of a slow drive are similar too, so the drive must first differ from itself before it repeats.
     """
     moving = voltage - voltage.mean()
-    power = float(moving @ moving)
-    if power == 0.0:
+    if moving @ moving == 0.0:
         return None
-    size = 1 << (2 * voltage.size - 1).bit_length()
-    spectrum = np.fft.rfft(moving, size)
-    product = np.fft.irfft(spectrum * spectrum.conj(), size)[: voltage.size // 2 + 1]
+    product = scipy.signal.correlate(moving, moving, method="fft")[voltage.size - 1 :][: voltage.size // 2 + 1]
     energy = np.concatenate(([0.0], np.cumsum(moving * moving)))
     lags = np.arange(product.size)
     overlap = energy[voltage.size - lags] + (energy[-1] - energy[lags])
