@@ -55,7 +55,8 @@ def missing_excitation(records: Sequence[Record], found: Collection[str] = ()) -
     """
     span = max(float(r.voltage.max()) for r in records) - min(float(r.voltage.min()) for r in records)
     contents = [excitation_content(r) for r in records]
-    kinds = ["slow loops" if c.is_slow else r.phase.split("_")[0] for r, c in zip(records, contents, strict=True)]
+    loops = [c.is_slow and c.bandwidth > 0.0 for c in contents]  # the bandwidth of a rest is 0
+    kinds = ["slow loops" if loop else r.phase.split("_")[0] for r, loop in zip(records, loops, strict=True)]
     present = {
         ExcitationNeed.HELD_LEVEL: any(_longest_hold(r, MOVED * span) >= HOLD for r in records),
         ExcitationNeed.REPEATED_PHASE: len(set(kinds)) < len(kinds),

@@ -73,3 +73,11 @@ def test_loops_of_two_sizes_show_memory_at_any_sample_period_and_noise_does_not(
 def test_repeated_slow_loops_show_drift_under_any_name():
     assert "drift" not in missing(record(loops(4.0), phase="run_a"), record(loops(2.0), phase="again"))
     assert "drift" in missing(record(loops(4.0), phase="run_a"))
+
+
+def test_a_rest_is_no_second_slow_loop():
+    for rest in (
+        record(np.full(2000, 3.0), phase="rest"),
+        record(np.full(2000, 3.0), initial_voltage=0.0, phase="step"),
+    ):
+        assert "no kind of phase was recorded twice" in missing(record(loops(4.0)), rest)
