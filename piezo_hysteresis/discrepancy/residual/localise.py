@@ -115,7 +115,7 @@ def localise(
     end = max(r.start_time + r.duration for r in records)
     times = [f"{k * end / 10:.3g} to {(k + 1) * end / 10:.3g} s" for k in range(10)]
     phases = list(dict.fromkeys(r.phase for r in records))
-    spectra = [np.abs(np.fft.rfft(e)) ** 2 / (f * f * e.size**2) for e, f in zip(residuals, floors, strict=True)]
+    spectra = [_one_sided(e) / (f * f) for e, f in zip(residuals, floors, strict=True)]
     frequencies = [np.fft.rfftfreq(r.size, r.sample_period) for r in records]
     places = [
         _place(
@@ -136,6 +136,13 @@ def localise(
     tenth = [np.minimum((10 * r.time / end).astype(int), 9) for r in records]
     places.append(_place("absolute_time", times, tenth, power))
     return tuple(place for place, _ in sorted(places, key=lambda found: -found[1]))
+
+
+def _one_sided(e: Array) -> Array:
+    """Power of e at the frequencies from dc to Nyquist, whose sum is its mean square; all others stand for two."""
+    power = np.abs(np.fft.rfft(e) / e.size) ** 2
+    power[1 : (e.size + 1) // 2] *= 2.0
+    return power
 
 
 def _place(

@@ -106,6 +106,22 @@ def test_a_line_shows_in_its_band_before_anything_else():
     assert by_axis["frequency"].share > 0.99
 
 
+@pytest.mark.parametrize("size", [1000, 1001])
+def test_a_constant_and_a_line_of_one_power_have_the_same_share_of_the_frequencies(size):
+    record = Record(np.linspace(0.0, 6.0, size), np.zeros(size), PERIOD, "triangle")
+    wave = np.sqrt(2.0) * np.cos(2.0 * np.pi * round(0.1 * size) * np.arange(size) / size)
+    (place,) = (p for p in localise([record], [1.0 + wave], [1e-8]) if p.axis == "frequency")
+    assert [share for _, share in place.bins if share > 1e-9] == pytest.approx([0.5, 0.5])
+
+
+def test_the_nyquist_frequency_counts_once():
+    size = 4
+    record = Record(np.linspace(0.0, 6.0, size), np.zeros(size), 1e-3, "triangle")
+    nyquist = np.array([1.0, -1.0, 1.0, -1.0])
+    (place,) = (p for p in localise([record], [1.0 + nyquist], [1e-8]) if p.axis == "frequency")
+    assert [share for _, share in place.bins if share > 1e-9] == pytest.approx([0.5, 0.5])
+
+
 def test_an_error_just_after_turning_points_shows_there():
     def residual(record):
         u = record.voltage
