@@ -104,6 +104,14 @@ def test_quantisation_is_noise_of_one_step_over_root_twelve():
     assert quantum(sine(100.0, 2e-5, 0.4)) == 0.0
 
 
+@pytest.mark.parametrize("size", [8, 12, 20, 31])
+def test_motion_in_a_few_samples_is_not_noise(size):
+    wave = np.sin(2 * np.pi * np.arange(size) / 20)
+    assert white_noise(Record(wave, wave, 1e-3)) < 0.02
+    rest = [Record(np.zeros(size), SIGMA * RANDOM.normal(size=size), 1e-3) for _ in range(400)]
+    assert np.median([white_noise(r) for r in rest]) == pytest.approx(SIGMA, rel=0.2)
+
+
 @pytest.mark.parametrize("size", [1, 2, 3])
 def test_a_record_too_short_for_a_spectrum_has_a_finite_floor(size):
     """A floor that is not a number ended the fits of a whole experiment."""

@@ -52,12 +52,14 @@ def stroke(records: Sequence[Record]) -> float:
 def white_noise(record: Record) -> float:
     """RMS of the white noise of a record [m], from the median of its spectrum near the Nyquist frequency.
 
-    0 for fewer than three samples, which do not show it.
+    Fewer than 32 samples have no such spectrum: their noise is that of third differences, in which motion is small. 0
+    for fewer than eight samples, which do not show it.
     """
-    if record.size < 3:
+    if record.size < 8:
         return 0.0
+    beside_motion = noise_on_motion(record.displacement, 3)
     if record.size < 32:
-        return float(np.std(np.diff(record.displacement)) / np.sqrt(2.0))
+        return beside_motion
     second = np.diff(record.displacement, 2)
     _, density = scipy.signal.periodogram(second, window=scipy.signal.windows.hann(second.size), detrend=False)
     frequency = np.linspace(0.0, np.pi, density.size)
@@ -66,7 +68,7 @@ def white_noise(record: Record) -> float:
     # values of a periodogram have an exponential distribution, whose median is ln 2 times its mean
     at_top = float(np.sqrt(np.median(density[top] / response[top]) / np.log(2.0) / 2.0))
     # jumps are in all of the spectrum but in few samples; fast motion is in all samples but not at the top
-    return min(at_top, noise_on_motion(record.displacement, 3))
+    return min(at_top, beside_motion)
 
 
 def period_scatter(record: Record) -> float | None:
