@@ -53,19 +53,10 @@ TURNS = 4
 
 
 def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
-    """Error of the explicit step in the displacement [m] of records at the sample period of the model.
+    """Error of the explicit step in the displacement of every record [m], for a model with the exact loop, shape (n,).
 
-    Parameters
-    ----------
-    model : Model
-        Model with the exact loop and its terms.
-    records : sequence of Record
-        Records in order.
-
-    Returns
-    -------
-    list of (n,) ndarray
-        Error by record; zero if the sample period is longer, because each sample then results from many steps.
+    It is zero in records with a longer sample period than that of the model, in which each sample results from many
+    steps.
 
     Raises
     ------
@@ -85,16 +76,8 @@ def explicit_model(model: Model, training_data: TrainingData, leaves: float = np
     """The model of data that were simulated with the explicit step; None if the residual does not contain its error.
 
     The error computed with a model that was fitted to such data is not exact. The error is subtracted and the model
-    fitted again, until both agree.
-
-    Parameters
-    ----------
-    model : Model
-        Model fitted to the training data.
-    training_data : TrainingData
-        Records and floors.
-    leaves : float
-        Largest cost after the subtraction. A large missing effect can have a similar residual.
+    fitted again, until both agree. The cost may not exceed `leaves` after this: a large missing effect can have a
+    similar residual.
     """
     if BoucWen.name not in model:
         return None

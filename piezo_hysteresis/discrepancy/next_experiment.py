@@ -33,15 +33,7 @@ FINEST = 1e-5
 
 
 def best_next_experiment(selection: Selection, training_data: TrainingData) -> Separation | None:
-    """The drive that best separates an accepted effect from its rival; None if no effect has one.
-
-    Parameters
-    ----------
-    selection : Selection
-        Result of the search.
-    training_data : TrainingData
-        Recorded data.
-    """
+    """The drive that best separates an accepted effect from its rival; None if no effect has one."""
     for step in selection.accepted:
         if step.confusable_with:
             rival = next(r for r in step.rivals if r.effect.public_name() == step.confusable_with[0])

@@ -98,16 +98,7 @@ def not_predicted_live(name: str, live: float) -> str:
 def conclusion_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[Conclusion, str]:
     """What the search found, and the reason in words.
 
-    Parameters
-    ----------
-    selection : Selection
-        Every step of the search.
-    named : bool
-        Whether its effects are to be named.
-    falls : bool
-        Whether they reduce the gap on the test records.
-    gap : Gap
-        Free-run error before and after.
+    `named` says whether its effects are to be named, and `falls` whether they reduce the gap on the test records.
     """
     if not selection.in_time and not named:
         return Conclusion.TIME_LIMIT, "No effect is named: the time limit ended the search before an answer was found."

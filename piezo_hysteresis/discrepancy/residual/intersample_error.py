@@ -85,12 +85,8 @@ def intersample_error(model: Model, records: Sequence[Record]) -> list[Array]:
 def quick_dynamics(model: Model, longest: float) -> Model:
     """The model without relaxations of G slower than `longest` [s], with the same dc gain.
 
-    Parameters
-    ----------
-    model : Model
-        Any model; without `arx` it is returned unchanged.
-    longest : float
-        Time constant from which a real pole counts as slow [s].
+    In a fit without creep, G gets poles at a few hertz, each close to a zero. They imitate creep in fast records. In
+    slow records G is a gain and a delay, so these poles have no influence. Without `arx` the model is unchanged.
     """
     if Arx.name not in model:
         return model
@@ -120,14 +116,9 @@ def _share(pole: float, zero: float) -> float:
 
 
 def chosen_correction(residual: Array, gradual: Array, abrupt: Array) -> Array:
-    """The correction that leaves the smoother and smaller residual; zero if neither improves it much.
+    """The correction that leaves the smoother and smaller residual; zero if neither improves it much; shape (n,) [m].
 
-    Parameters
-    ----------
-    residual : (n,) ndarray
-        Measured minus simulated displacement without a correction [m].
-    gradual, abrupt : (n,) ndarray
-        Corrections for a drive that ramps, and for a drive that jumps, within a sample [m].
+    The corrections are for a drive that ramps (`gradual`) and for one that jumps (`abrupt`) within a sample.
     """
     change = min((gradual, abrupt), key=lambda c: _unevenness(residual - c) * np.var(residual - c))
     smoother = _unevenness(residual - change) < SMOOTHER * _unevenness(residual)

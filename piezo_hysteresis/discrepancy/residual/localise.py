@@ -65,25 +65,10 @@ class ResidualShare:
 def located(
     model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float], nuisance: Nuisance
 ) -> tuple[ResidualShare, ...]:
-    """Shares of the residual of a model; records that are neither used nor continued by one are not simulated.
+    """Shares of the residual of a model on the records `used`, along every axis; `floors` are those of all records [m].
 
-    Parameters
-    ----------
-    model : Model
-        Model that is simulated in free run.
-    records : sequence of Record
-        The whole experiment.
-    used : sequence of int
-        Indices of the records whose residual is located.
-    floors : sequence of float
-        Floor of every record [m].
-    nuisance : Nuisance
-        Disturbances that are free in every record.
-
-    Raises
-    ------
-    DivergenceError
-        If the model diverges.
+    Records that are neither used nor continued by one are not simulated. A model that diverges on one raises a
+    DivergenceError.
     """
     left = residuals_on(model, records, used, nuisance)
     return localise([records[i] for i in used], left, [floors[i] for i in used])

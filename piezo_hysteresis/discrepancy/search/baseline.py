@@ -49,22 +49,11 @@ ORDERS = (8, 8)
 
 
 def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator[Model]:
-    """Hysteresis from the slow loops, delay from the steps, dynamics from the broadband records.
+    """Starts for a joint fit: hysteresis from slow loops, delay from steps, dynamics from broadband records.
 
-    A missing effect can disturb the iterations of the dynamics, so a model after few iterations follows the one after
-    many. Noise may hide modes that larger motion shows, so the last model uses all records that move.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        The experiment, in order.
-    fitted : collection of int
-        Indices of the records that may be used.
-
-    Yields
-    ------
-    Model
-        A start for the joint fit.
+    Only the records with the indices `fitted` are used. A missing effect can disturb the iterations of the dynamics, so
+    a model after few iterations follows the one after many. Noise may hide modes that larger motion shows, so the last
+    model uses all records that move.
     """
     experiment = Experiment(tuple(records))
     roles = roles_of(experiment)
@@ -93,21 +82,9 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
 
 
 def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int]) -> Iterator[Model]:
-    """The model with sums of modes as dynamics; ARX iterations do not find modes far below the sampling rate.
+    """The model with sums of modes as dynamics: from the broadband records of `fitted`, and from all that move.
 
-    Parameters
-    ----------
-    model : Model
-        Model with fitted hysteresis.
-    records : sequence of Record
-        The experiment, in order.
-    fitted : collection of int
-        Indices of the records that may be used.
-
-    Yields
-    ------
-    Model
-        Starts for the joint fit: from broadband records, and from all records that move.
+    Its hysteresis was fitted before. ARX iterations do not find modes far below the sampling rate.
     """
     experiment = Experiment(tuple(records))
     _, broadband, moving = _telling_dynamics(experiment, roles_of(experiment), fitted)

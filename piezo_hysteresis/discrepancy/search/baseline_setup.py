@@ -116,20 +116,8 @@ def prepare_baseline(
 ) -> BaselineSetup:
     """Floors, records to fit and to set aside, and the baseline.
 
-    Parameters
-    ----------
-    given : sequence of Record
-        The experiment, in order.
-    usable : sequence of int
-        Indices of the usable records.
-    model : Model or None
-        Start of the fit.
-    known : Selection or None
-        Result of an earlier search, whose model corrects averaged samples better than the baseline does.
-    corrects_intersample_error : bool
-        Whether the inter-sample error is corrected.
-    progress : callable
-        Called with a message and the fraction done.
+    The fit begins with `model`, or with one from the `usable` records, given by their indices. `known` is an earlier
+    search, whose model corrects averaged samples better than the baseline does.
     """
     progress("baseline", 0.1)
     records = tuple(slowed(r) for r in given)

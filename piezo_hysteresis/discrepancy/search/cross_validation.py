@@ -126,12 +126,7 @@ def indispensable(grams: Sequence[Gram], floors: Sequence[float] | Array, column
 
     For example, the only rest at a high level is the only record that shows how a stage settles there. If a record of n
     samples contains the share μ of the information about a direction, noise of the other records adds μ/(1 − μ)/n to
-    its R² when it is left out.
-
-    Parameters
-    ----------
-    grams, floors, columns
-        As for `cross_validate`.
+    its R² when it is left out. The arguments are those of `cross_validate`.
     """
     counted, products = _counted(grams, floors)
     hessians = [columns.T @ product @ columns for product in products]

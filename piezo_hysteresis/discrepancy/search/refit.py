@@ -62,23 +62,8 @@ class Fitted:
 def joint(model: Model, training_data: TrainingData, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
     """Joint fit of all free parameters of a model to the training data.
 
-    Parameters
-    ----------
-    model : Model
-        Model with start values.
-    training_data : TrainingData
-        Records, floors, and the disturbances that are free in each record.
-    max_iterations : int
-        Largest number of linearisations.
-    tolerance : float
-        Relative decrease of the cost at convergence.
-
-    Raises
-    ------
-    DivergenceError, ParameterError, ModelError, IdentificationError
-        As `fit` does.
-    TimeSpentError
-        If the time limit of the search has passed.
+    `tolerance` is the relative decrease of the cost at convergence. The fit raises one of `FAILURES`, or a
+    TimeSpentError if the time limit of the search has passed.
     """
     check_time()
     return fit(

@@ -167,12 +167,7 @@ def noise_floors(records: Sequence[Record]) -> Array:
 def noise_of_averages(noise: Array, before: Sequence[Record], after: Sequence[Record]) -> Array:
     """Noise of records of which some were averaged [m], shape (r,); that of averages is estimated anew, from them.
 
-    Parameters
-    ----------
-    noise : (r,) ndarray
-        Noise of the records before [m].
-    before, after : sequence of Record
-        The records before and after; the averages are those with a longer sample period.
+    `noise` is that of the records `before` [m]; the averages are the records of `after` with a longer sample period.
     """
     averaged = [a.sample_period > 1.001 * b.sample_period for a, b in zip(after, before, strict=True)]
     return np.where(averaged, np.minimum(noise, noise_floors(after)), noise) if any(averaged) else noise
