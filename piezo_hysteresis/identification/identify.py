@@ -28,7 +28,7 @@ import numpy as np
 from ..effects import HYSTERESIS, Arx, HysteresisOperator, Offset
 from ..errors import IdentificationError
 from ..model.model import Model
-from ..model.provenance import largest_error, provenance
+from ..model.provenance import provenance, record_errors
 from ..model.sample_periods import identified_periods
 from ..record import Notice, Record
 from .fit.fit import Fit, Progress
@@ -228,7 +228,10 @@ def identify(
         joint.model, joint, delay, dynamics, published, table, comparisons, phases, tuple(notices), structure
     )
     origin = provenance(experiment, found.free_run_error, found.free_run_percent)
-    origin = {**origin, **largest_error(p.rms for p in phases), **identified_range(records, roles.fitted)}
+    judged = roles.held_out or roles.fitted
+    moving = [p.rms for p, i in zip(found.judged, judged, strict=True) if roles.contents[i].span > 0.0]
+    errors = record_errors([p.rms for p in phases], moving or [found.free_run_error])
+    origin = {**origin, **errors, **identified_range(records, roles.fitted)}
     if not roles.broadband:
         origin |= identified_periods(records[i].sample_period for i in roles.fitted)
         origin |= {LAG_ERROR: f"{1.96 * lag(joint)[1]:.4g}"}

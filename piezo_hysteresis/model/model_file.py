@@ -44,6 +44,7 @@ _PROVENANCE = {
     "free_run_error": "m; rms in free run, on data left out where there were any",
     "free_run_error_percent": "% of the displacement range",
     "largest_record_error": "m; the largest rms of one record, fitted or left out",
+    "moving_record_error": "m; rms in free run over the records in which the drive moves",
     "data_hash": "of the samples that were fitted",
     "date": "UTC",
     "voltage_min": "V; of the records that were fitted",

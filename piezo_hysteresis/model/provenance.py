@@ -30,9 +30,14 @@ LARGEST = "largest_record_error"
 """Key of the largest error of one record. The free-run error is a mean over kinds of drive, and one kind has more."""
 
 
-def largest_error(errors: Iterable[float]) -> Mapping[str, str]:
-    """The largest of the RMS free-run errors of single records [m]."""
-    return {LARGEST: repr(float(f"{max(errors):.6g}"))}
+MOVING = "moving_record_error"
+"""Key of the free-run error over the records in which the drive moves. Rests have less, and lower the mean over all."""
+
+
+def record_errors(errors: Iterable[float], moving: Iterable[float]) -> Mapping[str, str]:
+    """The largest of the RMS free-run `errors` of single records, and the RMS over those that are `moving` [m]."""
+    rms = float(np.sqrt(np.mean(np.square(list(moving)))))
+    return {LARGEST: repr(float(f"{max(errors):.6g}")), MOVING: repr(float(f"{rms:.6g}"))}
 
 
 def provenance(experiment: Experiment, error: float, percent: float) -> Mapping[str, str]:
@@ -65,7 +70,7 @@ def free_run(error: float, percent: float) -> Mapping[str, str]:
 
 def with_stated_error(model: Model, percent: float, stroke: float) -> Model:
     """The model with its free-run error in the provenance; `percent` is in % of the `stroke` [m]."""
-    origin = {key: text for key, text in model.provenance.items() if key != LARGEST}  # that of other records
+    origin = {key: text for key, text in model.provenance.items() if key not in (LARGEST, MOVING)}  # of others
     return replace(model, provenance={**origin, **free_run(0.01 * percent * stroke, percent)})
 
 

@@ -310,6 +310,21 @@ def test_an_unchanged_stage_whose_slow_record_has_the_largest_error_gets_no_name
     assert change_of(own, stage.on_another_day(rng)) is None
 
 
+def test_rests_between_the_drives_do_not_lower_the_known_error(another_day):
+    """The error in a rest is the noise; a model that states a mean with rests would call every other day a change."""
+
+    def with_rests(stage):
+        drives = [growing_sine(f, PERIOD, (0.4, 0.7, 1.0)) for f in (1.0, 10.0, 60.0)]
+        held = [np.concatenate((u, np.full(500, u[-1]))) for u in drives]
+        parts = [stage.play(u, PERIOD, f"sine_{k}").split(u.size - 500) for k, u in enumerate(held)]
+        return Experiment(tuple(r for pair in parts for r in pair))
+
+    own = identify(with_rests(STAGE), memory=True).model
+    assert float(own.provenance["moving_record_error"]) > 1.2 * float(own.provenance["free_run_error"])
+    found = diagnose(with_rests(another_day), own)
+    assert "unchanged" in {n.kind for n in found.experiment.notices}
+
+
 @pytest.mark.parametrize(("changed", "describes"), [({"gain": 1.02}, True), ({"softening": 0.03}, False)])
 def test_a_recalibrated_model_must_be_as_good_as_it_was(model, changed, describes):
     found = recalibrate(model, played(replace(STAGE, noise_seed=1, **changed)))

@@ -36,7 +36,7 @@ from ...identification.records.conditioning_split import conditioning_length, co
 from ...identification.records.noise import without_voltage_noise
 from ...identification.records.noise_floor import floors, stroke
 from ...model.model import Model
-from ...model.provenance import LARGEST, largest_error, provenance
+from ...model.provenance import LARGEST, provenance, record_errors
 from ...record import CONDITIONING, Experiment, Record
 from ..excitation_check import check_motion, moves
 from .change_kinds import ParameterChange
@@ -144,7 +144,7 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     new, by_new = (fitted, single[1]) if kept else (zeroed(model), single[0])
     span = stroke(records)
     rms = min(before, after)
-    origin = {**provenance(experiment, rms, 100.0 * rms / span), **largest_error(by_new.tolist())}
+    origin = {**provenance(experiment, rms, 100.0 * rms / span), **record_errors(by_new.tolist(), by_new.tolist())}
     stated = float(model.provenance.get(LARGEST, model.provenance.get(ERROR, "0")))
     return Recalibration(
         replace(new, provenance={**model.provenance, **origin}),

@@ -27,7 +27,7 @@ from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.comparable import comparable
 from ...identification.records.noise_floor import floors, noise_floors, stroke
 from ...model.model import Model
-from ...model.provenance import data_hash, with_stated_error
+from ...model.provenance import MOVING, data_hash, with_stated_error
 from ...record import Experiment, Notice, Record
 from ..diagnosis import Diagnosis
 from ..gap import measure_gap
@@ -80,7 +80,7 @@ def same_stage(
     if model.provenance.get(HASH) in hashes or not used:
         return None
     least = floors(records, noise_floors(records))
-    known = float(model.provenance.get(ERROR, "0"))
+    known = float(model.provenance.get(MOVING, model.provenance.get(ERROR, "0")))
     limits = np.maximum(least, known).tolist()
     try:
         if known and is_unchanged(model, records, used, limits):
