@@ -16,7 +16,9 @@
 
 from __future__ import annotations
 
-from ...effects import AmplifierSaturation
+import numpy as np
+
+from ...effects import AmplifierSaturation, MainsHum
 from .candidate_refits import LEAST_GAIN
 from .candidates import FittedCandidate
 from .cross_validation import Score
@@ -25,6 +27,11 @@ from .selection_result import Rejection, typical
 
 KEEPS = 0.8
 """Largest share of V beyond noise that may remain after an effect."""
+
+PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
+"""Smallest number of mains periods in a record, longest sample period in mains periods, smallest number of records."""
+STEADY = 0.3
+"""Smallest ratio of the quartiles of the amplitude of hum."""
 
 
 def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
@@ -39,6 +46,8 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
         return Rejection(
             best.name, f"{100 * left:.0f} % of the excess error remains, and {100 * KEEPS:.0f} % is allowed"
         )
+    if best.name == MainsHum.name and not is_steady(best):
+        return Rejection(best.name, "its amplitude depends on the drive, which mains hum does not")
     alone = without(best)
     owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
     if owed < LEAST_GAIN:
@@ -50,6 +59,29 @@ def share_left(after: Score, before: Score, null: float) -> float:
     """Share of V beyond noise that remains; the worst record is ignored."""
     first, second = typical(before, after)
     return max(0.0, second - null) / max(first - null, 1e-12)
+
+
+def is_steady(hum: FittedCandidate) -> bool:
+    """Whether hum has about the same amplitude in all records, because it does not depend on the drive.
+
+    Hum is free in every record, also in those that cross-validation leaves out. It can take up what another effect
+    leaves at the mains frequency and its harmonics.
+    """
+    data, lines = hum.training_data, 2 * hum.training_data.nuisance.harmonics
+    frequency = data.nuisance.hum_frequency or 0.0
+    found = [
+        np.hypot(free[-lines::2], free[1 - lines :: 2])
+        for record, floor, free in zip(data.records, data.floors, hum.fit.nuisances, strict=True)
+        if np.isfinite(floor)
+        and free.size >= lines
+        and record.duration * frequency >= PERIODS
+        and record.sample_period * frequency <= RESOLVED
+    ]
+    if len(found) < FEWEST:
+        return True
+    strongest = np.array(found)[:, np.argmax(np.mean(np.square(found), axis=0))]
+    low, high = np.quantile(strongest, (0.25, 0.75))
+    return bool(low > STEADY * high)
 
 
 def bends_all_along(candidate: FittedCandidate) -> bool:

@@ -20,17 +20,18 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy.search import acceptance_tests
-from piezo_hysteresis.discrepancy.search.acceptance_tests import bends_all_along, first_rejection
+from piezo_hysteresis.discrepancy.search.acceptance_tests import bends_all_along, first_rejection, is_steady
 from piezo_hysteresis.discrepancy.search.candidate_refits import simplest
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.cross_validation import Score
 from piezo_hysteresis.discrepancy.search.refit import Fitted
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
-from piezo_hysteresis.effects import AmplifierSaturation, BoucWen, Creep, CreepFractional, GainDrift
+from piezo_hysteresis.effects import AmplifierSaturation, BoucWen, Creep, CreepFractional, GainDrift, MainsHum
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.record import Record
 
 EXTENT = Extent(0.0, 10.0, 1e3, 10.0, 1e-5, 2e-5, 100.0, 10.0, 10.0)
 
@@ -70,6 +71,21 @@ def test_an_effect_that_leaves_most_of_the_error_is_rejected():
     drift = fitted(GainDrift(g=0.05, tau=600.0), ("gain_drift.g", "gain_drift.tau"), np.eye(2))
     rejection = first_rejection(replace(drift, score=scored(1.0, 29.0)), scored(3.0, 30.0))
     assert "of the excess error remains" in rejection.reason
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "steady"),
+    [((9.0, 11.0, 10.0, 10.0, 12.0), True), ((0.2, 0.3, 0.2, 1.2, 58.0), False), ((0.2, 60.0), True)],
+    ids=["mains", "one drive", "too few records"],
+)
+def test_hum_has_the_same_amplitude_whatever_the_drive_does(amplitudes, steady):
+    """Beside the mains frequency, its harmonics are free; one record in phase with the drive must not decide."""
+    hum = fitted(MainsHum(), (), np.empty((0, 0)))
+    record = Record(np.zeros(1000), np.zeros(1000), 1e-3)
+    data = TrainingData((record,) * len(amplitudes), np.ones(len(amplitudes)), Nuisance(hum_frequency=50.0), EXTENT)
+    free = tuple(np.array([0.0, a, 0.0, 0.7, 0.0, 0.6, 0.0]) for a in amplitudes)
+    hum = replace(hum, training_data=data, fit=replace(hum.fit, nuisances=free))
+    assert is_steady(hum) is steady
 
 
 @pytest.mark.parametrize(("corner", "curve"), [(0.1, False), (4.0, False), (30.0, True)])
