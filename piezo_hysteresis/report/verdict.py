@@ -31,7 +31,7 @@ HEADLINES = {
     "missing_effect": "Missing effect: {names}",
     "changed_parameter": "A parameter of the model has changed: {names}",
     "nothing_missing": "Nothing is missing beyond the noise",
-    "nothing_changed": "Nothing has changed since the model was identified; a gap that is found now existed then too",
+    "nothing_changed": "Nothing has changed since the model was identified; what is missing now was missing then",
     "time_limit": "The time limit ended the search before a verdict",
     "insufficient_data": "The data do not allow a verdict",
     "unexplained_gap": "Something is missing, but these data do not determine what it is",
@@ -162,9 +162,10 @@ def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
     gap = answer.get("gap_percent_of_range") or {}
     if gap.get("after") is not None:
         seen = "On the test records" if gap.get("unseen", True) else "On the fitted data"
+        after = "after" if answer.get("effects") else "with the model that was fitted to these data"
         found.append(
             f"{seen} the gap (free-run error) is {gap['before']:.3g} % of the range before and {gap['after']:.3g} % "
-            f"after; the noise floor is {gap['floor']:.3g} %."
+            f"{after}; the noise floor is {gap['floor']:.3g} %."
         )
     correction = answer.get("unnamed_correction")
     if correction:

@@ -87,8 +87,8 @@ def same_stage(
             return Notice(
                 UNCHANGED,
                 "nothing has changed since the model was identified: apart from its zero, gain and loop height, which "
-                f"differ from day to day, its error is within the known error of {1e9 * known:.3g} nm; a gap that is "
-                "found now existed then too",
+                f"differ from day to day, its error is within the known error of {1e9 * known:.3g} nm; what is missing "
+                "now was missing then",
             )
         change = find_change(model, records, used, limits, progress)
         if change is None:
