@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 from ..errors import PiezoError
 from ..identification.fit.fit import Fit
 from ..identification.fit.normal_equations import Nuisance
+from ..identification.free_run_error import zero_per_phase
 from ..identification.identify import identify
 from ..identification.records.conditioning import with_conditioning
 from ..identification.records.noise_floor import floors, noise_floors, noise_of_averages
@@ -99,7 +100,7 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     if before.excess > ADEQUATE:
         start_helpers()  # effects will be searched for
     progress("location of the residual", 0.5)
-    where = located(baseline.model, records, fitted, least.tolist(), Nuisance(offset=True))
+    where = located(baseline.model, records, fitted, least.tolist(), zero_per_phase(baseline.model))
 
     steps: list[Step] = []
     now, score = (found.fit, score_model(start, training_data)) if found else (baseline, before)
@@ -113,7 +114,7 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     with ending_at(state.end):
         more = select(now.model, training_data, score, fitting, lambda word, part: progress(word, 0.6 + 0.3 * part))
     chosen = sorted(aside or fitted)
-    free = Nuisance(offset=True)
+    free = zero_per_phase(baseline.model)
     final = _Delivered(start, found.fit if found else None, free)
     contenders = [] if found else [_Delivered(now.stated_model, now, free)]
     if more.accepted:

@@ -54,6 +54,13 @@ def test_hum_is_explained_in_the_recordings_and_not_predicted_live():
     assert found.gap.live > 0.5 * found.gap.before
 
 
+def test_a_model_that_knows_the_hum_is_not_told_of_a_gap():
+    """Amplitude and phase of hum are free in every record, for the given model as for the one that named it."""
+    found = diagnose(HUM.experiment(), diagnose(HUM.experiment()).model)
+    assert found.verdict is Verdict.NOTHING_MISSING
+    assert found.gap.before < 1.3 * found.gap.floor
+
+
 def test_a_model_that_diverges_on_a_test_record_is_not_named(monkeypatch):
     def measured(models, *others):
         if "mains_hum" in models[1]:

@@ -30,7 +30,7 @@ from ...effects.extent import Extent
 from ...errors import DivergenceError
 from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.form_uncertainty import ADEQUACY
-from ...identification.fit.normal_equations import Nuisance
+from ...identification.free_run_error import hum_of
 from ...identification.records.conditioning import records_to_fit
 from ...identification.records.noise_floor import noise_floors, noise_of_averages, stroke
 from ...model.model import Model
@@ -136,7 +136,7 @@ def prepare_baseline(
 
     def gathered(records: Sequence[Record], lost: Sequence[Array]) -> TrainingData:
         kept, least, quiet = _short(records, noise, lost, span, fitted, SEARCHED)
-        return TrainingData(kept, least, Nuisance(), extent, start=unfitted, noise=quiet)
+        return TrainingData(kept, least, hum_of(start), extent, start=unfitted, noise=quiet)
 
     lost = [np.zeros(r.size) for r in records]
     training_data = gathered(records, lost)

@@ -17,12 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ...blocks.block import Array
 from ...effects.extent import Extent
-from ...identification.fit.normal_equations import Nuisance
+from ...identification.free_run_error import hum_of
 from ...identification.records.conditioning import with_conditioning
 from ...identification.records.leading_step import step_length
 from ...model.model import Model
@@ -61,5 +62,5 @@ def training_data_of(
         origin += [index] * len(cuts)
     weights, quiet = (np.array([np.inf if k is None else sizes[k] for k in origin]) for sizes in (least, noise))
     extent = Extent.of([records[i] for i in fitted], model.voltage_scale, model.displacement_scale)
-    free = Nuisance(offset=sum(not r.continues for r in records) > 1)
+    free = replace(hum_of(model), offset=sum(not r.continues for r in records) > 1)
     return TrainingData(tuple(blocks), weights, free, extent, tuple(jumps), noise=quiet)
