@@ -62,6 +62,16 @@ def test_the_saved_model_predicts_a_rate_left_out_as_well_as_the_best_model(freq
     assert all(np.isfinite(p["interval_95"]).all() for row in intervals for p in row.values())
 
 
+@pytest.mark.parametrize("place", ["filter_drive", "filter_pole"])
+def test_a_pole_before_the_hysteresis_is_named_and_one_behind_it_is_part_of_the_dynamics(place):
+    found = diagnose(played(replace(STAGE, pole=2e-5, **{place: 1e-3}), (1.0, 10.0, 60.0)))
+    rows = [row for row in found.effects() if row["name"] == "amplifier_bandwidth"]
+    assert len(rows) == (place == "filter_drive")
+    for row in rows:
+        low, high = row["parameters"]["tau"]["interval_95"]
+        assert low <= 1e-3 <= high < 1.2e-3
+
+
 def test_a_stage_of_the_published_form_gets_no_name():
     loop = BoucWen(A=-0.7691, beta=4.6075, gamma=-0.8725, p1=-0.1085, p2=2.1925)
     stage = Model((loop, Arx(a=(-0.5,), b=(0.2,), delay=1.0)), PERIOD, 10.0, 5e-5)

@@ -24,6 +24,8 @@ import numpy as np
 
 from ...effects import (
     MEMORY,
+    AmplifierBandwidth,
+    AmplifierBandwidthHeld,
     Creep,
     CreepTwoRates,
     EvenInputPolynomial,
@@ -36,6 +38,7 @@ from ...identification.identification import Identification
 from ...identification.structure.left_out import score_left_out
 from ...identification.structure.piece_fit import fit_pieces
 from ...identification.structure.pieces import pieces_of
+from ...identification.structure.pole_place import with_pole_behind
 from ...identification.structure.structure_choice import LEADS
 from ...identification.structure.structure_fit import free_numbers
 from ...identification.structure.uncertainty import as_fit
@@ -46,6 +49,8 @@ from .cross_validation import Score
 from .selection_result import Step
 from .training_data import TrainingData
 
+POLES = (AmplifierBandwidth.name, AmplifierBandwidthHeld.name)
+"""Forms of a pole before the hysteresis."""
 ORDER = (
     MEMORY.name,
     ExtraResonance.name,
@@ -53,6 +58,7 @@ ORDER = (
     CreepTwoRates.name,
     EvenInputPolynomial.name,
     MEMORY.level_term.name,
+    *POLES,
 )
 """Optional effects of a structure, the largest first."""
 SLOW = (Creep.name, CreepTwoRates.name)
@@ -98,9 +104,14 @@ def structure_steps(
     names = [n for n in certain if n != MEMORY.level_term.name or MEMORY.name in certain]
     steps: list[Step] = []
     for k, name in enumerate(names, 1):
-        model = reduce(Model.without, names[k:], found.model)
+        model = reduce(_without, names[k:], found.model)
         with suppress(PiezoError):
             best = candidate(name, refitted(model) if names[k:] else found.fit)
             steps.append(Step(before, best, True, rivals(name), ()))
             before = best.score
     return steps
+
+
+def _without(model: Model, name: str) -> Model:
+    """The model without an effect; the published model has the pole of an amplifier, too, but behind the hysteresis."""
+    return with_pole_behind(model) if name in POLES else model.without(name)

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...effects import AmplifierBandwidth, AmplifierBandwidthHeld, Arx
+from ...effects import AmplifierBandwidth, AmplifierBandwidthHeld, Arx, ExtraResonance
 from ...model.model import Model
 from ...record import Notice
 from ..steps.remaining_lag import amplifier_of, lag_beside_mode
@@ -72,6 +72,15 @@ class LinearPart:
         """Largest difference to the lag of such a model [samples]."""
         return max((abs(_lag(m) - _lag(self.fit.model)) for m in self.likely), default=0.0)
 
+    @property
+    def leads(self) -> dict[str, float]:
+        """The leads of a mode, and of a pole before the hysteresis over one behind it."""
+        found = {ExtraResonance.name: self.lead}
+        behind = [f.cost for f in self.others if amplifier_of(f.model) is None]
+        if (amplifier := amplifier_of(self.fit.model)) and behind:
+            found[amplifier.name] = float(np.log(min(behind) / self.fit.cost))
+        return found
+
     def notices(self, final: PieceFit) -> list[Notice]:
         """``ringing``, ``amplifier`` and ``step_time``, with the numbers of the final fit."""
         found = mode_notices(final)
@@ -99,6 +108,16 @@ def in_every_place(found: PieceFit, pieces: Sequence[RecordPiece], floors: Seque
     )
     tried = (fit_structure(model, pieces, floors, held_by(found)) for model in forms)
     return sorted((found, *tried), key=lambda f: f.cost)
+
+
+def with_pole_behind(model: Model) -> Model:
+    """The model with the pole of its amplifier as that of the dynamics behind the hysteresis."""
+    amplifier = amplifier_of(model)
+    if amplifier is None:
+        return model
+    pole = float(np.exp(-model.sample_period / amplifier["tau"])) if amplifier["tau"] > 0.0 else 0.0
+    arx = Arx(a=(-pole,), b=(1.0 - pole,), delay=model[Arx.name]["delay"])
+    return model.without(amplifier.name).with_effect(arx)
 
 
 def _lag(model: Model) -> float:

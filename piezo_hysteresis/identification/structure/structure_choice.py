@@ -34,7 +34,6 @@ from ...effects import (
     CreepTwoRates,
     Effect,
     EvenInputPolynomial,
-    ExtraResonance,
 )
 from ...effects.extent import Extent
 from ...errors import PiezoError
@@ -145,12 +144,12 @@ def choose_structure(
         message = f"{start.hysteresis.name} predicts data left out better by a factor of {np.exp(0.5 * lead):.3g}"
         notices.append(Notice("memory", f"{message}, so it is used instead of plays"))
         nothing = np.zeros((len(rival.names),) * 2)
-        leads = {ExtraResonance.name: linear.lead, **_leads_of_operator(start, full, chosen, pieces, sizes)}
+        leads = {**linear.leads, **_leads_of_operator(start, full, chosen, pieces, sizes)}
         fit = as_fit(rival, pieces, sizes, nothing, linear.open_lag)
         return StructureChoice(fit, tuple(judged), leads, tuple(notices))
     notices.append(Notice("memory", f"{MEMORY.name} is used: the stage remembers its turning points"))
     spread = spread_of(full, final, chosen, judged)
-    leads = {MEMORY.name: -lead, ExtraResonance.name: linear.lead, **_leads(chosen, judged)}
+    leads = {MEMORY.name: -lead, **linear.leads, **_leads(chosen, judged)}
     fit = as_fit(final, pieces, sizes, spread, linear.open_lag)
     return StructureChoice(fit, tuple(judged), leads, tuple(notices))
 
