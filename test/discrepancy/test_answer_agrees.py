@@ -44,8 +44,13 @@ def recorded(seed):
     return Experiment(tuple(stage.play(p.voltage, p.name, average=p.stored_every) for p in plan))
 
 
-def test_hum_is_explained_in_the_recordings_and_not_predicted_live():
-    found = diagnose(HUM.experiment())
+@pytest.fixture(scope="module")
+def with_hum():
+    return diagnose(HUM.experiment())
+
+
+def test_hum_is_explained_in_the_recordings_and_not_predicted_live(with_hum):
+    found = with_hum
     check_agreement(found)
     assert found.verdict is Verdict.NAMED
     # the amplifier of this stage has a time constant below one sample, which the dynamics can contain
@@ -54,9 +59,9 @@ def test_hum_is_explained_in_the_recordings_and_not_predicted_live():
     assert found.gap.live > 0.5 * found.gap.before
 
 
-def test_a_model_that_knows_the_hum_is_not_told_of_a_gap():
+def test_a_model_that_knows_the_hum_is_not_told_of_a_gap(with_hum):
     """Amplitude and phase of hum are free in every record, for the given model as for the one that named it."""
-    found = diagnose(HUM.experiment(), diagnose(HUM.experiment()).model)
+    found = diagnose(HUM.experiment(), with_hum.model)
     assert found.verdict is Verdict.NOTHING_MISSING
     assert found.gap.before < 1.3 * found.gap.floor
 
