@@ -75,12 +75,15 @@ class PhaseError:
         `rms` in per cent of the range of the experiment.
     is_fitted : bool
         False for held-out data.
+    is_moving : bool
+        Whether the drive moves.
     """
 
     phase: str
     rms: float
     percent: float
     is_fitted: bool
+    is_moving: bool
 
 
 def phase_errors(model: Model, experiment: Experiment, roles: Roles) -> tuple[PhaseError, ...]:
@@ -96,7 +99,13 @@ def phase_errors(model: Model, experiment: Experiment, roles: Roles) -> tuple[Ph
     errors = residuals(model, experiment.records, Nuisance(offset=True))
     rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
     return tuple(
-        PhaseError(experiment[i].phase, rms[i], 100.0 * rms[i] / experiment.range, i in roles.fitted)
+        PhaseError(
+            phase=experiment[i].phase,
+            rms=rms[i],
+            percent=100.0 * rms[i] / experiment.range,
+            is_fitted=i in roles.fitted,
+            is_moving=roles.contents[i].span > 0.0,
+        )
         for i in (*roles.fitted, *roles.held_out)
     )
 
@@ -153,6 +162,12 @@ class Identification:
     def free_run_error(self) -> float:
         """RMS free-run error over the tested records, with equal weights [m]."""
         return float(np.sqrt(np.mean([p.rms**2 for p in self.judged])))
+
+    @property
+    def moving_error(self) -> float:
+        """The same over those in which the drive moves; over all if it moves in none [m]."""
+        moving = [p for p in self.judged if p.is_moving] or self.judged
+        return float(np.sqrt(np.mean([p.rms**2 for p in moving])))
 
     @property
     def free_run_percent(self) -> float:

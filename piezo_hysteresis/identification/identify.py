@@ -228,9 +228,7 @@ def identify(
         joint.model, joint, delay, dynamics, published, table, comparisons, phases, tuple(notices), structure
     )
     origin = provenance(experiment, found.free_run_error, found.free_run_percent)
-    judged = roles.held_out or roles.fitted
-    moving = [p.rms for p, i in zip(found.judged, judged, strict=True) if roles.contents[i].span > 0.0]
-    errors = record_errors([p.rms for p in phases], moving or [found.free_run_error])
+    errors = record_errors(max(p.rms for p in phases), found.moving_error)
     origin = {**origin, **errors, **identified_range(records, roles.fitted)}
     if not roles.broadband:
         origin |= identified_periods(records[i].sample_period for i in roles.fitted)

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 
@@ -34,10 +34,14 @@ MOVING = "moving_record_error"
 """Key of the free-run error over the records in which the drive moves. Rests have less, and lower the mean over all."""
 
 
-def record_errors(errors: Iterable[float], moving: Iterable[float]) -> Mapping[str, str]:
-    """The largest of the RMS free-run `errors` of single records, and the RMS over those that are `moving` [m]."""
-    rms = float(np.sqrt(np.mean(np.square(list(moving)))))
-    return {LARGEST: repr(float(f"{max(errors):.6g}")), MOVING: repr(float(f"{rms:.6g}"))}
+def record_errors(largest: float, moving: float) -> Mapping[str, str]:
+    """The largest RMS free-run error of a single record, and that over the records in which the drive moves [m]."""
+    return {LARGEST: repr(float(f"{largest:.6g}")), MOVING: repr(float(f"{moving:.6g}"))}
+
+
+def known_error(model: Model, key: str) -> float:
+    """An error that a model states, `LARGEST` or `MOVING` [m]; if it states the mean error alone, that; else 0."""
+    return float(model.provenance.get(key, model.provenance.get("free_run_error", "0")))
 
 
 def provenance(experiment: Experiment, error: float, percent: float) -> Mapping[str, str]:

@@ -36,13 +36,13 @@ from ...identification.records.conditioning_split import conditioning_length, co
 from ...identification.records.noise import without_voltage_noise
 from ...identification.records.noise_floor import floors, stroke
 from ...model.model import Model
-from ...model.provenance import LARGEST, provenance, record_errors
+from ...model.provenance import LARGEST, known_error, provenance, record_errors
 from ...record import CONDITIONING, Experiment, Record
 from ..excitation_check import check_motion, moves
 from .change_kinds import ParameterChange
 from .change_search import ChangeSearch
 from .moved_group import is_as_good
-from .same_stage import ERROR, changed_model
+from .same_stage import changed_model
 
 Array = NDArray[np.float64]
 
@@ -144,8 +144,8 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     new, by_new = (fitted, single[1]) if kept else (zeroed(model), single[0])
     span = stroke(records)
     rms = min(before, after)
-    origin = {**provenance(experiment, rms, 100.0 * rms / span), **record_errors(by_new.tolist(), by_new.tolist())}
-    stated = float(model.provenance.get(LARGEST, model.provenance.get(ERROR, "0")))
+    origin = {**provenance(experiment, rms, 100.0 * rms / span), **record_errors(float(by_new.max()), rms)}
+    stated = known_error(model, LARGEST)
     return Recalibration(
         replace(new, provenance={**model.provenance, **origin}),
         best.own["gain"] if kept else 0.0,

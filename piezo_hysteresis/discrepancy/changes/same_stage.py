@@ -27,7 +27,7 @@ from ...identification.fit.normal_equations import Nuisance
 from ...identification.records.comparable import comparable
 from ...identification.records.noise_floor import floors, noise_floors, stroke
 from ...model.model import Model
-from ...model.provenance import MOVING, data_hash, with_stated_error
+from ...model.provenance import MOVING, data_hash, known_error, with_stated_error
 from ...record import Experiment, Notice, Record
 from ..diagnosis import Diagnosis
 from ..gap import measure_gap
@@ -37,8 +37,8 @@ from .change_kinds import KINDS, LEAVES, ParameterChange
 from .parameter_changes import find_change, is_unchanged
 from .signatures import DRIFT_TIME, creep_numbers, loop_numbers, shaped_model
 
-ERROR, HASH = "free_run_error", "data_hash"
-"""Keys of the provenance."""
+HASH = "data_hash"
+"""Key of the provenance."""
 UNCHANGED = "unchanged"
 """Kind of the notice that the given model is still as good as when it was identified."""
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
@@ -80,7 +80,7 @@ def same_stage(
     if model.provenance.get(HASH) in hashes or not used:
         return None
     least = floors(records, noise_floors(records))
-    known = float(model.provenance.get(MOVING, model.provenance.get(ERROR, "0")))
+    known = known_error(model, MOVING)
     limits = np.maximum(least, known).tolist()
     try:
         if known and is_unchanged(model, records, used, limits):

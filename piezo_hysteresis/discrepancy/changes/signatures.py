@@ -51,8 +51,6 @@ Array = NDArray[np.float64]
 
 AVERAGE = "moving_average"
 """A mean of the last samples; not a change that is named, because it resembles a Bessel filter of the same delay."""
-STEP = 1e-3
-"""Step of the derivative of the lag of an amplifier by its time constant [samples]."""
 DRIFT_TIME = 3.0
 """Time constant of a drift over the length of the longest record: the drift within a record is almost linear."""
 
@@ -162,10 +160,8 @@ def _slopes_of_amplifier(model: Model) -> dict[str, float]:
         return {}
     found = {f"{amplifier.name}.tau": 1.0}
     if Arx.name in model:
-        step = STEP * model.sample_period
-        slower = amplifier.with_values(tau=amplifier["tau"] + step)
-        late = 1.0 - (slower.lag(model.sample_period) - amplifier.lag(model.sample_period)) / step
-        found[f"{Arx.name}.delay"] = late / model.sample_period
+        _, slope = amplifier.lag(model.sample_period)
+        found[f"{Arx.name}.delay"] = (1.0 - slope) / model.sample_period
     return found
 
 
@@ -234,7 +230,7 @@ def shaped_model(model: Model, key: str, size: float) -> Model:
         old = amplifier_of(model) or AmplifierBandwidthHeld()
         new = old.with_values(tau=old["tau"] + size)
         # the hold of the converter stays a delay of the stage
-        held = size - (new.lag(model.sample_period) - old.lag(model.sample_period))
+        held = size - (new.lag(model.sample_period)[0] - old.lag(model.sample_period)[0])
         return shaped_model(model.with_effect(new), "delay", held)
     if KINDS[key].is_filter:
         name = KINDS[key].name

@@ -24,8 +24,6 @@ import numpy as np
 
 from ...effects import (
     MEMORY,
-    AmplifierBandwidth,
-    AmplifierBandwidthHeld,
     Creep,
     CreepTwoRates,
     EvenInputPolynomial,
@@ -35,6 +33,7 @@ from ...effects import (
 from ...errors import PiezoError
 from ...identification.fit.fit import Fit
 from ...identification.identification import Identification
+from ...identification.steps.remaining_lag import AMPLIFIERS
 from ...identification.structure.left_out import score_left_out
 from ...identification.structure.piece_fit import fit_pieces
 from ...identification.structure.pieces import pieces_of
@@ -49,7 +48,7 @@ from .cross_validation import Score
 from .selection_result import Step
 from .training_data import TrainingData
 
-POLES = (AmplifierBandwidth.name, AmplifierBandwidthHeld.name)
+POLES = tuple(form.name for form in AMPLIFIERS)
 """Forms of a pole before the hysteresis."""
 ORDER = (
     MEMORY.name,

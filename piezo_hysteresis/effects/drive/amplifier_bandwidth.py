@@ -55,9 +55,9 @@ class AmplifierBandwidth(Effect):
         """Off, and several sizes, because the system after the pole is not linear."""
         return cls(), *(cls(tau=tau) for tau in START_VALUES)
 
-    def lag(self, sample_period: float) -> float:
-        """Time by which samples of a slow signal are later behind the pole [s]."""
-        return self["tau"]
+    def lag(self, sample_period: float) -> tuple[float, float]:
+        """Time by which samples of a slow signal are later behind the pole [s], and its derivative by τ [1]."""
+        return self["tau"], 1.0
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return LowPassBlock("amplifier_bandwidth.tau", linear_step(self["tau"], setting.sample_period))

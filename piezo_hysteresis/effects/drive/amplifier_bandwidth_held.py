@@ -48,8 +48,8 @@ class AmplifierBandwidthHeld(AmplifierBandwidth):
     )
     source = "zero-order hold of the converter before R·C; Franklin, Powell, Workman 1998, Sec. 4.3"
 
-    def lag(self, sample_period: float) -> float:
-        return held_lag(self["tau"], sample_period)[0]
+    def lag(self, sample_period: float) -> tuple[float, float]:
+        return held_lag(self["tau"], sample_period)
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return LowPassBlock("amplifier_bandwidth_held.tau", self._step(setting))

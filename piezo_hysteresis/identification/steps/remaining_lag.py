@@ -30,7 +30,9 @@ from .linear_start import dynamics_of
 
 ONE_FREQUENCY = 4
 """Largest number of spectral lines of a drive with one frequency."""
-LATE = (Arx.name, AmplifierBandwidth.name, AmplifierBandwidthHeld.name)
+AMPLIFIERS = (AmplifierBandwidth, AmplifierBandwidthHeld)
+"""Forms of a pole before the hysteresis."""
+LATE = (Arx.name, *(form.name for form in AMPLIFIERS))
 """Effects whose lag is stated."""
 STATED = 0.01
 """Error, as a share of the range of a sine, for which the notice states the frequency."""
@@ -58,7 +60,7 @@ def lag(fit: Fit) -> tuple[float, float]:
 def lag_beside_mode(model: Model) -> float:
     """Group delay of G and of an amplifier before the hysteresis at low frequency [s]."""
     period, amplifier = model.sample_period, amplifier_of(model)
-    return dynamics_of(model).group_delay * period + (amplifier.lag(period) if amplifier else 0.0)
+    return dynamics_of(model).group_delay * period + (amplifier.lag(period)[0] if amplifier else 0.0)
 
 
 def amplifier_of(model: Model) -> AmplifierBandwidth | None:

@@ -26,10 +26,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...effects import AmplifierBandwidth, AmplifierBandwidthHeld, Arx, ExtraResonance
+from ...effects import Arx, ExtraResonance
 from ...model.model import Model
 from ...record import Notice
-from ..steps.remaining_lag import amplifier_of, lag_beside_mode
+from ..steps.remaining_lag import AMPLIFIERS, amplifier_of, lag_beside_mode
 from .mode import held_by, lag_of_mode, mode_notices
 from .piece_fit import PieceFit
 from .pieces import RecordPiece
@@ -102,10 +102,7 @@ def in_every_place(found: PieceFit, pieces: Sequence[RecordPiece], floors: Seque
         return [found]
     tau = -found.model.sample_period / float(np.log(-arx.array("a")[0]))
     bare = found.model.with_effect(Arx(a=(), b=(1.0,), delay=arx["delay"]))
-    forms = (
-        bare.with_effect(form(tau=min(tau, form.parameters[0].upper)))
-        for form in (AmplifierBandwidth, AmplifierBandwidthHeld)
-    )
+    forms = (bare.with_effect(form(tau=min(tau, form.parameters[0].upper))) for form in AMPLIFIERS)
     tried = (fit_structure(model, pieces, floors, held_by(found)) for model in forms)
     return sorted((found, *tried), key=lambda f: f.cost)
 
