@@ -52,4 +52,4 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         group = "devices" if device else "browsers" if browser else item.path.stem
         item.add_marker(pytest.mark.xdist_group(group))
         if nodes:
-            item.add_marker(pytest.mark.flaky(reruns=2))
+            item.add_marker(pytest.mark.flaky(reruns=1))

@@ -319,6 +319,10 @@ class Lab:
             stamp = (self.node.get_clock().now() - rclpy.duration.Duration(seconds=age)).to_msg()
         self._command.publish(command_to_cloud(voltage, sample_period, phase, stamp))
 
+    def renew_command(self) -> None:
+        """Send the next command from a new publisher: a new driver may never find one that its predecessor knew."""
+        del self._command
+
     def call(self, kind: type, service: str, request: Any = None) -> Any:
         """Answer of a service. A `Trigger` is sent once; anything else again where no answer comes."""
         client, probe = self._client(kind, service)
