@@ -30,7 +30,7 @@ import numpy as np
 
 from benchmarks.figures import Cell, Figures, alone
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
-from piezo_hysteresis.discrepancy.changes.parameter_changes import find_change
+from piezo_hysteresis.changes.parameter_changes import find_change
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.records.noise_floor import floors
 from piezo_hysteresis.model.model import Model

@@ -41,7 +41,6 @@ from benchmarks.naming_experiments import FULL, corners, ladder, multisine, nois
 from piezo_hysteresis.discrepancy import diagnose, floors, measure_gap, noise_floors, stroke
 from piezo_hysteresis.discrepancy.search.selection_result import explained
 from piezo_hysteresis.effects import BY_NAME
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.report.figures.diagnosis.correction import correction as draw_correction
 from piezo_hysteresis.report.figures.drawing import Drawing
@@ -177,9 +176,9 @@ def answer(case: Case) -> tuple[Outcome, Drawing | None]:
     removed, before, after, ratios = 0.0, np.nan, np.nan, np.empty(0)
     if correction is not None and correction.model is not None and found.model is not None:
         records, sigma = second.records, noise_floors(second.records)
-        least, chosen, plain = floors(records, sigma), range(len(records)), (Nuisance(), Nuisance())
+        least, chosen = floors(records, sigma), range(len(records))
         models = (found.model, correction.model)
-        gap = measure_gap(models, records, chosen, least.tolist(), stroke(records), plain, True)
+        gap = measure_gap(models, records, chosen, least.tolist(), stroke(records), unseen=True)
         sizes = np.array([(p.before, p.after, p.floor) for p in gap.per_phase])
         ratios = sizes[:, 1] / sizes[:, 0]
         null = float(np.mean((sigma / least) ** 2))

@@ -43,7 +43,7 @@ import numpy as np
 from benchmarks.figures import Cell, Figures, alone
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.effects import ExtraResonance
-from piezo_hysteresis.identification.free_run_error import errors, zero_per_phase
+from piezo_hysteresis.identification.free_run_error import errors, free_per_record
 from piezo_hysteresis.identification.identification import Identification
 from piezo_hysteresis.identification.identified_range import LAG_ERROR
 from piezo_hysteresis.identification.identify import identify
@@ -146,12 +146,14 @@ def run(options: argparse.Namespace) -> list[Figures]:
             recorded = measured(played(stage, fitted, levels, period), options.voltage_noise, rng)
             identified = identify(recorded, memory=True)
             unseen = played(stage, judged, LEVELS, period)
-            rows = errors(identified.model, unseen, zero_per_phase(identified.model)).rows
+            rows = errors(identified.model, unseen, free_per_record(identified.model, offset=True)).rows
             holds = lag_holds(identified, stage, period)
             found.setdefault(what, []).append((max(r.percent for r in rows), holds))
         recorded = measured(without_step(stage, low, period), options.voltage_noise, rng)
         slowest = identify(recorded, memory=True)
-        (row,) = errors(slowest.model, without_step(stage, high, period), zero_per_phase(slowest.model)).rows
+        (row,) = errors(
+            slowest.model, without_step(stage, high, period), free_per_record(slowest.model, offset=True)
+        ).rows
         uncertainty = float(slowest.model.provenance[LAG_ERROR])
         one_rate.append((row.percent, 100.0 * error_of_lag(uncertainty, high), lag_holds(slowest, stage, period)))
     table: list[tuple[Cell, ...]] = []

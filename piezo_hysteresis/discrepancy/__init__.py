@@ -25,7 +25,7 @@ from ..identification.records.noise_floor import floors, noise_floors, stroke
 from .diagnose import diagnose
 from .diagnosis import Diagnosis
 from .gap import Gap, measure_gap
-from .residual.localise import ResidualShare, localise
+from .localise import ResidualShare, localise
 from .search.selection import select
 from .search.selection_result import Selection
 from .verdict import Conclusion, Verdict

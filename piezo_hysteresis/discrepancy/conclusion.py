@@ -23,15 +23,14 @@ from dataclasses import replace
 from ..errors import DivergenceError
 from ..identification.fit.fit import Fit, Progress
 from ..identification.fit.form_uncertainty import with_form_uncertainty
-from ..identification.fit.normal_equations import Nuisance
+from ..identification.records.excitation_check import missing_excitation
 from ..model.model import Model
 from ..model.provenance import with_stated_error
 from ..record import Experiment
 from .diagnosis import Diagnosis
-from .excitation_check import missing_excitation
 from .gap import Gap, measure_gap
+from .localise import ResidualShare
 from .next_experiment import best_next_experiment
-from .residual.localise import ResidualShare
 from .search.baseline_setup import BaselineSetup
 from .search.refit import LAST, PRECISE, joint, restart
 from .search.selection_result import Selection
@@ -64,30 +63,30 @@ def concluded(
     worse.
     """
     progress("gap", 0.85)
-    named = is_explained(selection)
     whole, noise = setup.for_last_fit()
-    least, zero = setup.least.tolist(), setup.training_data.nuisance
     first = joint(selection.baseline, whole, LAST, PRECISE)
 
-    def gap_of(last: Fit, nuisance: Nuisance, chosen: Sequence[int]) -> Gap:
-        models, nuisances, unseen = (first.model, last.model), (zero, nuisance), chosen is setup.test_records
-        return measure_gap(models, setup.records, chosen, least, setup.span, nuisances, unseen)
+    def gap_of(before: Model, after: Model, chosen: Sequence[int], *, offset: bool = False) -> Gap:
+        unseen = chosen is setup.test_records
+        both, least = (before, after), setup.least.tolist()
+        return measure_gap(both, setup.records, chosen, least, setup.span, unseen=unseen, offset=offset)
 
     tested = setup.test_records or setup.fitted
+    named = is_explained(selection)
     falls = diverges = False
     if named:
-        free = selection.accepted[-1].best.training_data.nuisance
-        final = _finished(selection, replace(whole, nuisance=free))
+        final = _finished(selection, whole)
         with suppress(DivergenceError):  # on a test record, which moves further than those that were fitted
-            gap = gap_of(final, free, tested)
+            gap = gap_of(first.model, final.model, tested)
             falls = gap.falls
     if not falls:
-        final, free = first, zero
+        final = first
         try:
-            gap = gap_of(first, zero, tested)
+            gap = gap_of(first.model, first.model, tested)
         except DivergenceError:
-            diverges = True
-            gap = gap_of(first, zero, setup.fitted)
+            tested, diverges = setup.fitted, True
+            gap = gap_of(first.model, first.model, tested)
+    free = whole.free_with(final.model)
     final = with_form_uncertainty(final, whole.records, free, whole.floors, noise, setup.span)
     progress("next experiment", 0.95)
     if diverges:
@@ -97,13 +96,11 @@ def concluded(
     delivered = final.stated_model
     fit: Fit | None = final
     if given is not None:
-        chosen = tuple(p.index for p in gap.per_phase)
-        zeros = replace(zero, offset=True), replace(free, offset=True)
         with suppress(DivergenceError):
-            gap = measure_gap((given, delivered), setup.records, chosen, least, setup.span, zeros, gap.unseen)
+            gap = gap_of(given, delivered, tested, offset=True)
             if not falls and gap.after > gap.before:  # a refit that names nothing must not predict worse
                 delivered, fit = given, None
-                gap = measure_gap((given, given), setup.records, chosen, least, setup.span, zeros, gap.unseen)
+                gap = gap_of(given, given, tested, offset=True)
     is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
     found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
     missing = missing_excitation([setup.records[i] for i in setup.usable], found)

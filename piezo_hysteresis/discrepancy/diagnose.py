@@ -28,15 +28,15 @@ from ..identification.fit.fit import Progress
 from ..identification.inputs import experiment_of
 from ..identification.one_core import on_one_core
 from ..identification.records.comparable import comparable
+from ..identification.records.excitation_check import check_motion, moves
 from ..identification.records.roles import roles_of
+from ..identification.records.sampling import is_faster, resampled
 from ..model.model import Model
 from ..record import Notice, Record
-from .changes.same_stage import UNCHANGED, same_stage
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
-from .excitation_check import check_motion, moves
 from .many_records import diagnose_many
-from .residual.sampling import is_faster, resampled
+from .same_stage import UNCHANGED, same_stage
 from .search.execution.cores import using_cores
 from .single_record import diagnose_few
 from .unnamed.correction import without_corrections

@@ -19,16 +19,16 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ..changes.change_kinds import ParameterChange
 from ..effects import CHAIN
 from ..html_table import html_table
 from ..identification.fit.fit import Fit
 from ..model.model import Model
 from ..picture import Pictured
 from ..record import Experiment
-from .changes.change_kinds import ParameterChange
 from .choice.time_to_decide import Separation
 from .gap import Gap, gap_answer
-from .residual.localise import ResidualShare
+from .localise import ResidualShare
 from .search.selection_result import Rejection, Selection
 from .unnamed.correction import Correction
 from .verdict import Conclusion, Verdict

@@ -24,10 +24,10 @@ import numpy as np
 from ..effects import Effect
 from ..identification.fit.fit import Progress
 from ..identification.fit.form_uncertainty import PIECES
+from ..identification.records.excitation_check import moves
 from ..identification.records.noise import VOLTAGE_NOISE
 from ..model.model import Model
 from ..record import CONDITIONING, Experiment
-from .excitation_check import moves
 
 IDLE = ("idle", "hold", CONDITIONING)
 """Phases that only bring the stage from one state to another."""

@@ -32,9 +32,9 @@ from ..effects import BoucWen
 from ..effects.hysteresis.explicit_bouc_wen import ExplicitBoucWen
 from ..identification.fit.normal_equations import grams
 from ..identification.records.conditioning import with_conditioning
+from ..identification.records.sampling import at_period, is_faster, less
 from ..model.model import Model
 from ..record import Experiment, Notice, Record
-from .residual.sampling import at_period, is_faster, less
 from .search.candidates import adjusted_numbers, directions
 from .search.cross_validation import cross_validate
 from .search.refit import FAILURES, LATER, joint
@@ -111,7 +111,7 @@ def _share(model: Model, training_data: TrainingData, changes: list[Array]) -> f
     """Share of the changes in the residual, fitted linearly together with all free parameters of the model."""
     names = adjusted_numbers(model, training_data)
     rows = [c[None, :] for c in changes]
-    products = grams(model, training_data.records, names, training_data.nuisance, rows)
+    products = grams(model, training_data.records, names, training_data.free_with(model), rows)
     return float(cross_validate(products, training_data.floors, directions(model, names, 1)).step[-1])
 
 

@@ -17,18 +17,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy
 
 from ..blocks.block import Array
+from ..effects import MainsHum
 from ..identification.fit.normal_equations import Nuisance
+from ..identification.free_run_error import free_per_record, residuals_on
+from ..identification.records.noise_floor import ADEQUATE
 from ..model.model import Model
 from ..record import Record
-from .residual.residual import residuals_on
-from .search.cross_validation import ADEQUATE
 from .search.selection_result import explained
 
 FALLS = 0.9
@@ -119,8 +120,9 @@ def measure_gap(
     chosen: Sequence[int],
     floors: Sequence[float],
     stroke: float,
-    nuisances: tuple[Nuisance, Nuisance],
+    *,
     unseen: bool,
+    offset: bool = False,
 ) -> Gap:
     """Compare two models on the records `chosen`.
 
@@ -136,10 +138,10 @@ def measure_gap(
         Floor of every record [m].
     stroke : float
         Range of the experiment [m].
-    nuisances : (Nuisance, Nuisance)
-        Disturbances that are free in every record, for each model.
     unseen : bool
         Whether the chosen records were used neither for fitting nor for choosing.
+    offset : bool
+        Whether the sensor zero is free in every record. The hum of a model with hum always is.
 
     Raises
     ------
@@ -151,9 +153,8 @@ def measure_gap(
         left = residuals_on(model, records, chosen, nuisance)
         return np.array([100.0 * float(np.sqrt(np.mean(e**2))) / stroke for e in left])
 
-    before, after = map(left_by, models, nuisances)
-    steady = replace(nuisances[1], hum_frequency=None)
-    live = after if steady == nuisances[1] else left_by(models[1], steady)
+    before, after = (left_by(model, free_per_record(model, offset=offset)) for model in models)
+    live = left_by(models[1], Nuisance(offset)) if MainsHum.name in models[1] else after
     least = 100.0 * np.array([floors[i] for i in chosen]) / stroke
     squares = after**2
     mean, interval = float(squares.mean()), None

@@ -19,14 +19,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..errors import DivergenceError
+from ..identification.records.noise_floor import ADEQUATE
 from ..model.model import Model
 from .conclusion import concluded
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .explicit_step import explicit_model, without_steps
-from .residual.localise import ResidualShare, located
+from .localise import ResidualShare, located
 from .search.baseline_setup import BaselineSetup, prepare_baseline
-from .search.cross_validation import ADEQUATE
 from .search.execution.time_limit import ending_at
 from .search.selection import select
 from .search.selection_result import Selection
@@ -97,8 +97,8 @@ def _explicit_model(selection: Selection) -> Model | None:
 
 def _where(state: DiagnosisState, setup: BaselineSetup) -> tuple[ResidualShare, ...]:
     state.progress("location of the residual", 0.82)
-    model, least, nuisance = setup.baseline.model, setup.least.tolist(), setup.training_data.nuisance
+    model, least = setup.baseline.model, setup.least.tolist()
     try:
-        return located(model, setup.records, setup.usable, least, nuisance)
+        return located(model, setup.records, setup.usable, least)
     except DivergenceError:  # on a test record, which moves further than those that were fitted
-        return located(model, setup.records, setup.fitted, least, nuisance)
+        return located(model, setup.records, setup.fitted, least)

@@ -27,11 +27,11 @@ from dataclasses import dataclass, replace
 
 from ..errors import PiezoError
 from ..identification.fit.fit import Fit
-from ..identification.fit.normal_equations import Nuisance
-from ..identification.free_run_error import zero_per_phase
 from ..identification.identify import identify
 from ..identification.records.conditioning import with_conditioning
-from ..identification.records.noise_floor import floors, noise_floors, noise_of_averages
+from ..identification.records.excitation_check import missing_excitation
+from ..identification.records.noise_floor import ADEQUATE, floors, noise_floors, noise_of_averages
+from ..identification.records.sampling import shortened
 from ..identification.structure.left_out import has_several_drives, score_left_out
 from ..model.model import Model
 from ..model.provenance import provenance
@@ -39,13 +39,11 @@ from ..record import Notice, Record
 from .conclusion import answered
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
-from .excitation_check import missing_excitation
 from .gap import Gap, measure_gap
-from .residual.localise import located
-from .residual.sampling import shortened
+from .localise import located
 from .search.baseline import as_conditioning, with_zero
 from .search.candidates import loop_is_off, score_model
-from .search.cross_validation import ADEQUATE, Score
+from .search.cross_validation import Score
 from .search.execution.cores import start_helpers
 from .search.execution.time_limit import ending_at
 from .search.record_blocks import training_data_of
@@ -66,11 +64,10 @@ EXTENDS = 0.1
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Delivered:
-    """The saved model, its fit, and the disturbances that are free in every record."""
+    """The saved model and its fit."""
 
     model: Model
     fit: Fit | None
-    nuisance: Nuisance
 
 
 def diagnose_few(state: DiagnosisState) -> Diagnosis:
@@ -100,7 +97,7 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     if before.excess > ADEQUATE:
         start_helpers()  # effects will be searched for
     progress("location of the residual", 0.5)
-    where = located(baseline.model, records, fitted, least.tolist(), zero_per_phase(baseline.model))
+    where = located(baseline.model, records, fitted, least.tolist(), offset=True)
 
     steps: list[Step] = []
     now, score = (found.fit, score_model(start, training_data)) if found else (baseline, before)
@@ -114,12 +111,11 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     with ending_at(state.end):
         more = select(now.model, training_data, score, fitting, lambda word, part: progress(word, 0.6 + 0.3 * part))
     chosen = sorted(aside or fitted)
-    free = zero_per_phase(baseline.model)
-    final = _Delivered(start, found.fit if found else None, free)
-    contenders = [] if found else [_Delivered(now.stated_model, now, free)]
+    final = _Delivered(start, found.fit if found else None)
+    contenders = [] if found else [_Delivered(now.stated_model, now)]
     if more.accepted:
         last = more.accepted[-1].best
-        contenders.append(_Delivered(last.fit.stated_model, last.fit, last.training_data.nuisance))
+        contenders.append(_Delivered(last.fit.stated_model, last.fit))
     if contenders:
         final = _best(final, contenders, records, least.tolist(), fitted, chosen)
     if more.accepted and final is contenders[-1]:
@@ -130,8 +126,8 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
 
     progress("gap", 0.9)
     first = model or baseline.model  # the gap of a given model is measured before any refit
-    models, nuisances = (first, final.model), (free, replace(final.nuisance, offset=True))
-    gap = measure_gap(models, records, chosen, least.tolist(), span, nuisances, bool(aside))
+    both = first, final.model
+    gap = measure_gap(both, records, chosen, least.tolist(), span, unseen=bool(aside), offset=True)
     shown = {s.best.effect.public_name() for s in selection.accepted}
     missing = missing_excitation([records[i] for i in used], shown)
     said = conclusion_of_few(selection, is_certain, before, gap, len(used), several, missing)

@@ -21,8 +21,8 @@ from enum import StrEnum
 import numpy as np
 
 from ..identification.fit.form_uncertainty import ADEQUACY
+from ..identification.records.noise_floor import ADEQUATE
 from .gap import Gap
-from .search.cross_validation import ADEQUATE
 from .search.selection_result import Selection
 
 FEWEST_RECORDS = 4

@@ -23,7 +23,7 @@ from typing import Protocol
 from ..discrepancy import diagnose
 from ..effects import HYSTERESIS, OPERATORS
 from ..errors import ParameterError
-from ..identification.free_run_error import errors, zero_per_phase
+from ..identification.free_run_error import errors, free_per_record
 from ..identification.identified_range import outside
 from ..identification.identify import identify
 from ..identification.records.comparable import comparable
@@ -98,7 +98,7 @@ class Validate:
     def __call__(self, experiment: Experiment) -> WorkResult:
         model = model_file.loads(self.model)
         known, conditioned = comparable(experiment)
-        found = errors(model, known, zero_per_phase(model))
+        found = errors(model, known, free_per_record(model, offset=True))
         records = known.records
         floor = floors(records, noise_floors(records))
         judged = [floor[row.index] ** 2 for row in found.judged]

@@ -21,7 +21,8 @@ of the measured displacement over the whole experiment. The paper's Table 1 uses
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,7 +31,8 @@ from ..effects import MainsHum
 from ..errors import RecordError
 from ..model.model import Model
 from ..record import CONDITIONING, Experiment, Record
-from .fit.normal_equations import Nuisance
+from .fit.normal_equations import Nuisance, residuals
+from .records.conditioning import with_conditioning
 
 SINE = re.compile(r"sine_([0-9.]+)hz")
 """Phase name of a sine, with its frequency [Hz]."""
@@ -177,22 +179,27 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
         means = np.array([np.mean(r.displacement - y) for r, y in zip(experiment, free_run, strict=True)])
         known = np.array([_has_known_start(r) for r in experiment])
         zero = float(means[known if known.any() else ~known].mean())
-        nuisance = hum_of(model)
+        nuisance = free_per_record(model, offset=False)
     pairs = zip(experiment, free_run, strict=True)
-    residuals = [nuisance.removed_from(r.displacement - (y + zero), r) for r, y in pairs]
-    predicted = [r.displacement - e for r, e in zip(experiment, residuals, strict=True)]
-    rows = [_row(i, r, e, span) for i, (r, e) in enumerate(zip(experiment, residuals, strict=True))]
-    return Errors(span, zero, tuple(rows), tuple(predicted), tuple(residuals))
+    left = [nuisance.removed_from(r.displacement - (y + zero), r) for r, y in pairs]
+    predicted = [r.displacement - e for r, e in zip(experiment, left, strict=True)]
+    rows = [_row(i, r, e, span) for i, (r, e) in enumerate(zip(experiment, left, strict=True))]
+    return Errors(span, zero, tuple(rows), tuple(predicted), tuple(left))
 
 
-def hum_of(model: Model) -> Nuisance:
-    """The mains hum of a model, free in every record; nothing if the model contains no hum."""
-    return Nuisance(hum_frequency=model[MainsHum.name]["f"] if MainsHum.name in model else None)
+def residuals_on(model: Model, records: Sequence[Record], wanted: Sequence[int], nuisance: Nuisance) -> list[Array]:
+    """Residuals of the records `wanted` [m], in free run, without the disturbances that are free in every record.
+
+    Other records are only simulated if one of these continues them. A model that diverges raises a DivergenceError.
+    """
+    kept = with_conditioning(records, wanted)
+    left = dict(zip(kept, residuals(model, [records[i] for i in kept], nuisance), strict=True))
+    return [left[i] for i in wanted]
 
 
-def zero_per_phase(model: Model) -> Nuisance:
-    """A sensor zero in every record, as in `identify`, and the hum of a model that contains hum."""
-    return replace(hum_of(model), offset=True)
+def free_per_record(model: Model, *, offset: bool) -> Nuisance:
+    """What is free in every record: the hum of a model that contains hum, and with `offset` the sensor zero."""
+    return Nuisance(offset, model[MainsHum.name]["f"] if MainsHum.name in model else None)
 
 
 def _has_known_start(record: Record) -> bool:

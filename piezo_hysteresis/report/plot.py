@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from ..discrepancy import Diagnosis
 from ..errors import RecordError
-from ..identification.free_run_error import zero_per_phase
+from ..identification.free_run_error import free_per_record
 from ..identification.identification import Identification
 from ..model.model import Model
 from ..record import Experiment, Record
@@ -67,4 +67,6 @@ def plot(
     model = what.model if isinstance(what, Identification) else what
     if experiment is None:
         raise RecordError("plot: got a model alone, expected an experiment too; give plot(model, experiment)")
-    return time_series(compare(experiment, {"model": model}, {"model": zero_per_phase(model)}, with_band=True))
+    return time_series(
+        compare(experiment, {"model": model}, {"model": free_per_record(model, offset=True)}, with_band=True)
+    )

@@ -21,7 +21,7 @@ from datetime import datetime
 
 import numpy as np
 
-from ..discrepancy.changes.recalibration_history import RecalibratedNumber
+from ..changes.recalibration_history import RecalibratedNumber
 from ..errors import RecordingError
 from .figures.drawing import Drawing
 from .figures.style import MEASURED, RESIDUAL, canvas, styled

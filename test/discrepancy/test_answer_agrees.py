@@ -67,10 +67,10 @@ def test_a_model_that_knows_the_hum_is_not_told_of_a_gap(with_hum):
 
 
 def test_a_model_that_diverges_on_a_test_record_is_not_named(monkeypatch):
-    def measured(models, *others):
+    def measured(models, *others, **options):
         if "mains_hum" in models[1]:
             raise DivergenceError("arx", 0, 0.0)
-        return measure_gap(models, *others)
+        return measure_gap(models, *others, **options)
 
     monkeypatch.setattr(conclusion, "measure_gap", measured)
     found = diagnose(HUM.experiment())

@@ -23,7 +23,6 @@ from piezo_hysteresis.discrepancy.explicit_step import KIND, explicit_model, ste
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, AsymmetricHysteresis, BoucWen, HysteresisExponent, PublishedBoucWen
 from piezo_hysteresis.effects.extent import Extent
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 
@@ -52,7 +51,7 @@ def answered(kind):
 def training_data(records):
     floors = np.full(len(records), 3.0 * NOISE)
     return TrainingData(
-        records, floors, Nuisance(), Extent.of(records, model(BoucWen).voltage_scale, model(BoucWen).displacement_scale)
+        records, floors, Extent.of(records, model(BoucWen).voltage_scale, model(BoucWen).displacement_scale)
     )
 
 

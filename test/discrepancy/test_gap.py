@@ -19,14 +19,12 @@ import pytest
 
 from piezo_hysteresis.discrepancy.gap import measure_gap
 from piezo_hysteresis.effects import Arx, BoucWen, Offset
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 MODEL = Model((BoucWen(), Arx(b=[0.25]), Offset()), sample_period=1e-3, displacement_scale=2e-5)
 ERRORS = (1e-8, 3e-8, 5e-8)
 STROKE = 1e-5
-PLAIN = (Nuisance(), Nuisance())
 
 
 @pytest.fixture(scope="module")
@@ -41,8 +39,8 @@ def records():
     return found
 
 
-def measure(records, models, chosen, nuisances=PLAIN):
-    return measure_gap(models, records, chosen, [2e-8] * 3, STROKE, nuisances, True)
+def measure(records, models, chosen, offset=False):
+    return measure_gap(models, records, chosen, [2e-8] * 3, STROKE, unseen=True, offset=offset)
 
 
 def test_the_gap_is_rms_over_range_with_equal_weights(records):
@@ -63,7 +61,7 @@ def test_before_and_after_belong_to_the_two_models(records):
 
 def test_free_disturbances_are_not_part_of_the_gap(records):
     shifted = MODEL.with_effect(Offset(y0=2e-8))
-    gap = measure(records, (shifted, MODEL), (0,), (Nuisance(offset=True), Nuisance()))
+    gap = measure(records, (shifted, MODEL), (0,), offset=True)
     assert gap.before == pytest.approx(gap.after)
 
 

@@ -24,8 +24,8 @@ import pytest
 from benchmarks.coverage import truth_of
 from benchmarks.naming_cases import UNKNOWN, Case
 from benchmarks.naming_experiments import ProtocolVariant
+from piezo_hysteresis.changes.recalibration import recalibrate
 from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
-from piezo_hysteresis.discrepancy.changes.recalibration import recalibrate
 from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
 from piezo_hysteresis.effects import BY_NAME, CATALOGUE, Arx, BoucWen, Softening
 from piezo_hysteresis.errors import DivergenceError, IdentificationError, ParameterError

@@ -29,7 +29,6 @@ from piezo_hysteresis.effects import Arx, BoucWen, Creep, Offset, SensorNonlinea
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.fit.fit import Fit
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
@@ -53,7 +52,7 @@ def test_a_drive_with_which_a_model_diverges_separates_nothing():
         first.simulate(violent)
     records = (gentle.with_channels(lambda x: x, displacement=MODEL.simulate(gentle)[0]),)
     extent = Extent.of(records, MODEL.voltage_scale, MODEL.displacement_scale)
-    training_data = TrainingData(records, np.array([1e-9]), Nuisance(), extent)
+    training_data = TrainingData(records, np.array([1e-9]), extent)
     found = distances(first, second, training_data, {"gentle": gentle, "violent": violent})
     assert found["gentle"] > 0.0
     assert found["violent"] == 0.0
@@ -64,7 +63,7 @@ def rivals(period, *effects):
     stage = Model((BoucWen(), Arx(b=(1.0,))), period, 10.0, 1e-5)
     u = 2.5 + 1.5 * np.sin(2.0 * np.pi * period / 0.5 * np.arange(round(2.0 / period)))
     records = (Record(u, np.zeros(u.size), period, initial_voltage=2.5),)
-    data = TrainingData(records, np.array([5e-9]), Nuisance(), Extent.of(records, 10.0, 1e-5))
+    data = TrainingData(records, np.array([5e-9]), Extent.of(records, 10.0, 1e-5))
     same = Score(np.ones(1), np.zeros(1))
     fitted = []
     for effect in effects:
@@ -100,7 +99,7 @@ def test_equal_rivals_are_told_that_no_drive_decides():
 def test_a_jump_in_the_first_sample_is_a_recorded_slew_rate():
     held = Record(np.full(100, 4.0), np.zeros(100), 1e-3, initial_voltage=1.0)
     extent = replace(Extent.of((held,), 10.0, 1e-5), voltage_min=1.0, voltage_max=4.0)
-    drives = possible_drives(TrainingData((held,), np.array([5e-9]), Nuisance(), extent))
+    drives = possible_drives(TrainingData((held,), np.array([5e-9]), extent))
     assert max(d.largest_slew for d in drives) <= 3.0 / 1e-3 * (1 + 1e-6)
 
 
@@ -109,5 +108,5 @@ def test_drives_at_long_sample_periods_are_those_that_the_rate_allows(period):
     """Noise of a second has too few samples there, as a sine of 1 Hz does."""
     u = np.concatenate([np.linspace(0.0, 10.0, 100), np.linspace(10.0, 0.0, 100)])
     slow = Record(u, np.zeros(u.size), period)
-    drives = possible_drives(TrainingData((slow,), np.ones(1), Nuisance(), Extent.of((slow,), 10.0, 1e-5)))
+    drives = possible_drives(TrainingData((slow,), np.ones(1), Extent.of((slow,), 10.0, 1e-5)))
     assert {"staircase", "rest"} <= {d.name for d in drives}

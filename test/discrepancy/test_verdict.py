@@ -27,15 +27,12 @@ from piezo_hysteresis.discrepancy.verdict import is_explained
 from piezo_hysteresis.effects import Arx, BoucWen, Creep
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.fit import Fit
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
 STAGE = Model((BoucWen(), Arx(b=(1.0,))), 1e-4, 10.0, 1e-5)
 RECORD = Record(np.linspace(0.0, 10.0, 100), np.zeros(100), 1e-4)
-EVIDENCE = TrainingData(
-    (RECORD,), np.ones(1), Nuisance(), Extent.of([RECORD], STAGE.voltage_scale, STAGE.displacement_scale)
-)
+EVIDENCE = TrainingData((RECORD,), np.ones(1), Extent.of([RECORD], STAGE.voltage_scale, STAGE.displacement_scale))
 
 
 def selection(explained, leaves):

@@ -21,7 +21,7 @@ import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.effects import ExtraResonance
-from piezo_hysteresis.identification.free_run_error import errors, zero_per_phase
+from piezo_hysteresis.identification.free_run_error import errors, free_per_record
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.records.comparable import comparable
 from piezo_hysteresis.identification.records.excitation_content import excitation_content
@@ -92,7 +92,7 @@ def test_identification_with_a_noisy_voltage_predicts_other_rates():
     found = identify(noisy, memory=True)
     assert VOLTAGE_NOISE in {n.kind for n in found.notices}
     assert ExtraResonance in {type(e) for e in found.model.effects}
-    unseen = errors(found.model, Experiment((played[10.0],)), zero_per_phase(found.model))
+    unseen = errors(found.model, Experiment((played[10.0],)), free_per_record(found.model, offset=True))
     assert unseen.percent < 0.2
-    again = errors(found.model, comparable(noisy)[0], zero_per_phase(found.model))
+    again = errors(found.model, comparable(noisy)[0], free_per_record(found.model, offset=True))
     assert again.percent == pytest.approx(found.free_run_percent, rel=0.05)

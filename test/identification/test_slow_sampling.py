@@ -19,7 +19,7 @@ import pytest
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.effects import Arx, BoucWen
-from piezo_hysteresis.identification.free_run_error import errors, zero_per_phase
+from piezo_hysteresis.identification.free_run_error import errors, free_per_record
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.structure.pieces import Kind, RecordPiece
 from piezo_hysteresis.identification.structure.ringing import decay_after_steps
@@ -57,7 +57,7 @@ def test_a_mode_that_the_samples_do_not_resolve_is_described_at_other_rates(mode
     )
     found = identify(known, memory=True).model
     assert found[Arx.name].array("a").size >= 2
-    assert errors(found, unseen, zero_per_phase(found)).percent < 0.15
+    assert errors(found, unseen, free_per_record(found, offset=True)).percent < 0.15
 
 
 def echo(radius, angle, size=40):

@@ -25,7 +25,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from piezo_hysteresis.acquisition.sample_block import SampleBlock
-from piezo_hysteresis.discrepancy.changes.recalibration_history import read_numbers
+from piezo_hysteresis.changes.recalibration_history import read_numbers
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.model_file import load, loads, save

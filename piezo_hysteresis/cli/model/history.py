@@ -21,7 +21,7 @@ from pathlib import Path
 
 from rich.table import Table
 
-from ...discrepancy.changes.recalibration_history import FILE, read_numbers
+from ...changes.recalibration_history import FILE, read_numbers
 from ...errors import RecordingError
 from ..options.destination import add_force, require_new_results
 from ..terminal import console

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import argparse
 
-from ...discrepancy.changes.moved_group import EXCESS, FULL
-from ...discrepancy.changes.recalibration import Recalibration, recalibrate
+from ...changes.moved_group import EXCESS, FULL
+from ...changes.recalibration import Recalibration, recalibrate
 from ...identification.records.noise import without_voltage_noise
 from ...model import model_file
 from ...report.json_file import write_json

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import RecordError
-from ...identification.free_run_error import Errors, zero_per_phase
+from ...identification.free_run_error import Errors, free_per_record
 from ...identification.identified_range import outside
 from ...identification.records.comparable import comparable
 from ...model import model_file
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         return several_axes.validate(reading_options.read(args), args)
     model = model_file.load(args.model)
     experiment, conditioned = comparable(reading_options.read(args))
-    nuisances = None if args.one_zero else {"error": zero_per_phase(model)}
+    nuisances = None if args.one_zero else {"error": free_per_record(model, offset=True)}
     comparison = compare(experiment, {"error": model}, nuisances)
     now = comparison.errors["error"]
     tests = _tests(experiment, now)

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import ParameterError, RecordingError
-from ...identification.free_run_error import zero_per_phase
+from ...identification.free_run_error import free_per_record
 from ...identification.records.comparable import comparable
 from ...model import model_file
 from ...report.figures.comparison import compare
@@ -78,7 +78,9 @@ def run(args: argparse.Namespace) -> int:
     if models:
         prepared, notices = comparable(experiment)
         experiment = prepared.noting(*notices)
-    nuisances = None if args.one_zero else {label: zero_per_phase(model) for label, model in models.items()}
+    nuisances = (
+        None if args.one_zero else {label: free_per_record(model, offset=True) for label, model in models.items()}
+    )
     with progress("report") as report_progress:
         drawn = page(compare(experiment, models, nuisances), answer=answer, title=args.title, progress=report_progress)
     path = Path(args.output).expanduser()

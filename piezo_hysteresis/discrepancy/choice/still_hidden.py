@@ -30,10 +30,10 @@ from ...identification.fit.covariance import sandwich
 from ...identification.fit.form_uncertainty import PIECES
 from ...identification.fit.normal_equations import grams
 from ...identification.protocol.phases import ProtocolPhase
+from ...identification.records.noise_floor import ADEQUATE
 from ...model.model import Model
 from ...record import Record
 from ..search.candidates import adjusted_numbers, directions
-from ..search.cross_validation import ADEQUATE
 from ..search.refit import FAILURES
 from ..search.training_data import TrainingData
 
@@ -102,7 +102,7 @@ def _may_show(
     q = len(base)
     columns = directions(model, base, len(sizes))
     total, meat = np.zeros((len(columns),) * 2), np.zeros((columns.shape[1],) * 2)
-    products = grams(extended, training_data.records, [*base, *sizes], training_data.nuisance)
+    products = grams(extended, training_data.records, [*base, *sizes], training_data.free_with(extended))
     for gram, size_of_error in zip(products, training_data.floors, strict=True):
         if np.isfinite(size_of_error):
             weighted = gram.matrix / (gram.size * size_of_error**2)

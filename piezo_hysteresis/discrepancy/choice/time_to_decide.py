@@ -166,7 +166,7 @@ def distances(
     """
     free = adjusted_numbers(first, training_data)
     directions = gauge(first, free)
-    products = grams(first, training_data.records, free, training_data.nuisance)
+    products = grams(first, training_data.records, free, training_data.free_with(first))
     known: Array = sum(g.matrix / (g.size * f * f) for g, f in zip(products, training_data.floors, strict=True))
     prior = directions.T @ known[:-1, :-1] @ directions
     floor = float(np.min(training_data.floors))
@@ -177,7 +177,7 @@ def distances(
         except DivergenceError:
             found[name] = 0.0
             continue
-        (gram,) = grams(first, [record], free, training_data.nuisance, [difference[None, :]])
+        (gram,) = grams(first, [record], free, training_data.free_with(first), [difference[None, :]])
         total = gram.matrix[:-1, :-1] / (gram.size * floor * floor)
         q = len(free)
         cross = directions.T @ total[:q, q]

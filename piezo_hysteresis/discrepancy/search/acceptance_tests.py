@@ -23,7 +23,7 @@ from .candidate_refits import LEAST_GAIN
 from .candidates import FittedCandidate
 from .cross_validation import Score
 from .refit import without
-from .selection_result import Rejection, typical
+from .selection_result import Rejection, explained, typical
 
 KEEPS = 0.8
 """Largest share of V beyond noise that may remain after an effect."""
@@ -41,7 +41,7 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
         return Rejection(
             best.name, f"in cross-validation it lowers mean ln R² by {gain:.2f}, and {LEAST_GAIN:g} is needed"
         )
-    left = share_left(best.score, before, best.training_data.null)
+    left = (1.0 - explained(*typical(before, best.score), best.training_data.null)) ** 2
     if left > KEEPS:
         return Rejection(
             best.name, f"{100 * left:.0f} % of the excess error remains, and {100 * KEEPS:.0f} % is allowed"
@@ -55,20 +55,14 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
     return None
 
 
-def share_left(after: Score, before: Score, null: float) -> float:
-    """Share of V beyond noise that remains; the worst record is ignored."""
-    first, second = typical(before, after)
-    return max(0.0, second - null) / max(first - null, 1e-12)
-
-
 def is_steady(hum: FittedCandidate) -> bool:
     """Whether hum has about the same amplitude in all records, because it does not depend on the drive.
 
     Hum is free in every record, also in those that cross-validation leaves out. It can take up what another effect
     leaves at the mains frequency and its harmonics.
     """
-    data, lines = hum.training_data, 2 * hum.training_data.nuisance.harmonics
-    frequency = data.nuisance.hum_frequency or 0.0
+    data, frequency = hum.training_data, hum.effect["f"]
+    lines = 2 * data.free_with(hum.fit.model).harmonics
     found = [
         np.hypot(free[-lines::2], free[1 - lines :: 2])
         for record, floor, free in zip(data.records, data.floors, hum.fit.nuisances, strict=True)

@@ -30,16 +30,15 @@ from ...effects.extent import Extent
 from ...errors import DivergenceError
 from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.form_uncertainty import ADEQUACY
-from ...identification.free_run_error import hum_of
 from ...identification.records.conditioning import records_to_fit
-from ...identification.records.noise_floor import noise_floors, noise_of_averages, stroke
+from ...identification.records.intersample_error import intersample_error
+from ...identification.records.noise_floor import ADEQUATE, noise_floors, noise_of_averages, stroke
+from ...identification.records.sampling import at_period, common_period, less, shortened, slowed
 from ...model.model import Model
 from ...record import Record
-from ..residual.intersample_error import intersample_error
-from ..residual.sampling import at_period, common_period, less, shortened, slowed
 from .baseline import exact, modal_models, start_models
 from .candidates import score_baseline, score_model
-from .cross_validation import ADEQUATE, Score
+from .cross_validation import Score
 from .execution.cores import start_helpers
 from .refit import FAILURES, LAST, PRECISE, joint
 from .selection_result import Selection
@@ -136,7 +135,7 @@ def prepare_baseline(
 
     def gathered(records: Sequence[Record], lost: Sequence[Array]) -> TrainingData:
         kept, least, quiet = _short(records, noise, lost, span, fitted, SEARCHED)
-        return TrainingData(kept, least, hum_of(start), extent, start=unfitted, noise=quiet)
+        return TrainingData(kept, least, extent, start=unfitted, noise=quiet)
 
     lost = [np.zeros(r.size) for r in records]
     training_data = gathered(records, lost)

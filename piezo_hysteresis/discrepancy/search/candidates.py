@@ -53,7 +53,7 @@ class Candidate:
     effect : Effect
         The effect with its start values, or with fitted values after a refit.
     training_data : TrainingData
-        Records, and the disturbances that are free in each of them with this effect.
+        Records for fitting and choosing.
     score : Score
         Score from a linearisation at the start values, or after the refit.
     """
@@ -87,9 +87,9 @@ def adjusted_numbers(model: Model, training_data: TrainingData) -> list[str]:
     `settling` of the offset is not adjusted if all records start at one level, because the data do not determine it.
     """
     skipped = {f"{Arx.name}.delay", f"{MainsHum.name}.f"}
-    if training_data.nuisance.offset:
+    if training_data.offset:
         skipped.add(f"{Offset.name}.y0")
-    if training_data.nuisance.offset or not training_data.begins_at_levels:
+    if training_data.offset or not training_data.begins_at_levels:
         skipped.add(f"{Offset.name}.settling")
     if loop_is_off(model):  # it stays off
         skipped |= {f"{model.hysteresis.name}.{n}" for n in model.hysteresis.memory_names}
@@ -125,7 +125,7 @@ def score_baseline(model: Model, training_data: TrainingData) -> tuple[TrainingD
 
 def _linearised(model: Model, training_data: TrainingData) -> tuple[list[Gram], Array, tuple[Array, Array]]:
     names = adjusted_numbers(model, training_data)
-    products = grams(model, training_data.records, names, training_data.nuisance)
+    products = grams(model, training_data.records, names, training_data.free_with(model))
     columns = directions(model, names)
     return products, columns, room_of(model, names, columns)
 
@@ -161,8 +161,7 @@ def _screen_group(model: Model, training_data: TrainingData, base: list[str], gr
     if not group[0].is_off:
         return _screen_moves(model, training_data, base, group)
     if isinstance(group[0], MainsHum):
-        with_hum = training_data.with_hum(group[0]["f"])
-        return [Candidate(group[0], with_hum, score_model(model, with_hum))]
+        return [Candidate(group[0], training_data, score_model(model.with_effect(group[0]), training_data))]
     return _screen_off(model, training_data, base, group)
 
 
@@ -183,7 +182,7 @@ def _screen_off(model: Model, training_data: TrainingData, base: list[str], memb
     adjusted = adjusted_numbers(extended, training_data)
     own = [[n for n in adjusted if n.startswith(f"{e.name}.")] for e in members]
     names = [*base, *(n for added in own for n in added)]
-    products = grams(extended, training_data.records, names, training_data.nuisance)
+    products = grams(extended, training_data.records, names, training_data.free_with(extended))
     columns = directions(model, base, len(names) - len(base))
     return _scored(extended, names, training_data, products, columns, zip(members, map(len, own), strict=True))
 
@@ -199,7 +198,7 @@ def _screen_moves(model: Model, training_data: TrainingData, base: list[str], mo
     if not usable:
         return []
     changes = [np.array(change) for change in zip(*rows, strict=True)]
-    products = grams(model, training_data.records, base, training_data.nuisance, changes)
+    products = grams(model, training_data.records, base, training_data.free_with(model), changes)
     columns = directions(model, base, len(usable))
     found = _scored(model, base, training_data, products, columns, ((e, 1) for e in usable))
     # with a negative step, the effect with opposite sign would improve the prediction

@@ -28,8 +28,6 @@ import numpy as np
 from ...blocks.block import Array
 from ...identification.fit.normal_equations import Gram
 
-ADEQUATE = 1.5
-"""Mean R² up to which nothing is missing beyond noise."""
 RIDGE = 1e-9
 """Relative size below which a direction of the parameters counts as undetermined and is not changed."""
 TINY = 1e-200

@@ -17,13 +17,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from ...blocks.block import Array
 from ...effects.extent import Extent
-from ...identification.free_run_error import hum_of
 from ...identification.records.conditioning import with_conditioning
 from ...identification.records.leading_step import step_length
 from ...model.model import Model
@@ -39,7 +37,7 @@ FEWEST = 256
 def training_data_of(
     records: Sequence[Record], fitted: Collection[int], noise: Array, least: Array, model: Model
 ) -> TrainingData:
-    """The blocks of the records `fitted`, a leading jump apart, with what is free in each record.
+    """The blocks of the records `fitted`, a leading jump apart, with a zero in each of several records.
 
     `noise` and `least` are noise and floor of every record [m], shape (r,). Records that only set the state stay whole
     and have an infinite floor; others are left out. The ranges are in the units of `model`.
@@ -62,5 +60,5 @@ def training_data_of(
         origin += [index] * len(cuts)
     weights, quiet = (np.array([np.inf if k is None else sizes[k] for k in origin]) for sizes in (least, noise))
     extent = Extent.of([records[i] for i in fitted], model.voltage_scale, model.displacement_scale)
-    free = replace(hum_of(model), offset=sum(not r.continues for r in records) > 1)
-    return TrainingData(tuple(blocks), weights, free, extent, tuple(jumps), noise=quiet)
+    several = sum(not r.continues for r in records) > 1
+    return TrainingData(tuple(blocks), weights, extent, tuple(jumps), noise=quiet, offset=several)

@@ -71,7 +71,7 @@ def joint(model: Model, training_data: TrainingData, max_iterations: int, tolera
         training_data.records,
         adjusted_numbers(model, training_data),
         floors=training_data.floors.tolist(),
-        nuisance=training_data.nuisance,
+        nuisance=training_data.free_with(model),
         max_iterations=max_iterations,
         tolerance=tolerance,
     )
@@ -165,7 +165,7 @@ def without(candidate: FittedCandidate) -> Fitted | None:
     that the dynamics can contain is no missing effect, although a joint fit may have stopped before they contained it.
     """
     model = candidate.fit.model.without(candidate.name)
-    training_data = candidate.training_data.without(candidate.name)
+    training_data = candidate.training_data
     starts = [
         model,
         _absorbed(model, candidate.fit.model, training_data) if candidate.effect.family in LINEAR else None,

@@ -25,6 +25,7 @@ from contextlib import suppress
 from ...effects import CATALOGUE, Effect
 from ...identification.fit.fit import Progress
 from ...identification.fit.normal_equations import residuals
+from ...identification.records.noise_floor import ADEQUATE
 from ...model.model import Model
 from .acceptance_tests import bends_all_along, first_rejection
 from .candidate_refits import (
@@ -36,7 +37,7 @@ from .candidate_refits import (
     simplest,
 )
 from .candidates import BY_COST, FittedCandidate, screen
-from .cross_validation import ADEQUATE, Score
+from .cross_validation import Score
 from .execution.time_limit import TimeSpentError
 from .selection_result import Rejection, Selection, Step
 from .training_data import TrainingData
@@ -95,7 +96,7 @@ def _turn(
     progress: Progress,
 ) -> Step | None:
     progress("score test of the catalogue", 0.0)
-    training_data = training_data.with_peaks(residuals(model, training_data.records, training_data.nuisance))
+    training_data = training_data.with_peaks(residuals(model, training_data.records, training_data.free_with(model)))
     present = {e.public_name() for e in model.effects}
     twins = {e.name: t.name for e in effects for t in model.effects if e.is_twin_of(t)}
     absent = [e for e in effects if e.public_name() not in present and e.name not in twins]

@@ -22,13 +22,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...blocks.block import Array
-from ...effects import MainsHum
 from ...effects.extent import Extent
 from ...identification.fit.normal_equations import Nuisance
+from ...identification.free_run_error import free_per_record
+from ...identification.records.excitation_check import moves
 from ...identification.records.excitation_content import excitation_content
 from ...model.model import Model
 from ...record import Record
-from ..excitation_check import moves
 
 PER_TEST_RECORD = 3
 """Number of records of a kind per test record."""
@@ -42,7 +42,7 @@ MOVES = 30.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TrainingData:
-    """Records for fitting and choosing, with their floors and the disturbances that are free in each.
+    """Records for fitting and choosing, with their floors.
 
     Parameters
     ----------
@@ -50,8 +50,6 @@ class TrainingData:
         In experiment order.
     floors : (r,) ndarray
         Floor of every record [m]; infinite for a record that only determines the state of the stage.
-    nuisance : Nuisance
-        Disturbances that are free in every record.
     extent : Extent
         Ranges that the records cover.
     alone : tuple of int
@@ -60,15 +58,17 @@ class TrainingData:
         The model before any joint fit; its hysteresis was fitted to slow records only.
     noise : (r,) ndarray, optional
         Noise of every record [m]; equal to the floors by default.
+    offset : bool
+        Whether the sensor zero is free in every record.
     """
 
     records: tuple[Record, ...]
     floors: Array
-    nuisance: Nuisance
     extent: Extent
     alone: tuple[int, ...] = ()
     start: Model | None = None
     noise: Array | None = None
+    offset: bool = False
 
     @property
     def begins_at_levels(self) -> bool:
@@ -81,6 +81,10 @@ class TrainingData:
         """V of a perfect model: mean squared ratio of noise to floor."""
         noise, counted = self.floors if self.noise is None else self.noise, np.isfinite(self.floors)
         return float(np.mean((noise[counted] / self.floors[counted]) ** 2))
+
+    def free_with(self, model: Model) -> Nuisance:
+        """The disturbances that are free in every record for a model."""
+        return free_per_record(model, offset=self.offset)
 
     def broadband(self) -> list[int]:
         """Records whose drive determines linear dynamics."""
@@ -97,14 +101,6 @@ class TrainingData:
         counted = [i for i, floor in enumerate(self.floors) if np.isfinite(floor)]
         peaks = peaks_of([self.records[i] for i in counted], [left[i] for i in counted])
         return replace(self, extent=replace(self.extent, peaks=peaks))
-
-    def with_hum(self, frequency: float) -> TrainingData:
-        """The same data with mains hum of free amplitude and phase in every record."""
-        return replace(self, nuisance=replace(self.nuisance, hum_frequency=frequency))
-
-    def without(self, effect: str) -> TrainingData:
-        """The same data for a model without `effect`; without mains hum, hum is not free in the records."""
-        return replace(self, nuisance=replace(self.nuisance, hum_frequency=None)) if effect == MainsHum.name else self
 
 
 def peaks_of(records: Sequence[Record], left: Sequence[Array]) -> tuple[float, ...]:

@@ -128,8 +128,9 @@ def judged_on_test_records(correction: Correction, model: Model, setup: Baseline
     training_data, _ = setup.for_last_fit()
     try:
         fit = joint(model.with_effect(correction.effect), training_data, LAST, PRECISE)
-        both, nuisances = (model, fit.model), (training_data.nuisance, training_data.nuisance)
-        gap = measure_gap(both, setup.records, setup.test_records, setup.least.tolist(), setup.span, nuisances, True)
+        gap = measure_gap(
+            (model, fit.model), setup.records, setup.test_records, setup.least.tolist(), setup.span, unseen=True
+        )
     except FAILURES as error:
         return replace(correction, refusal=f"its last fit failed ({error})")
     ratios = np.array([(p.before / p.floor, p.after / p.floor) for p in gap.per_phase])

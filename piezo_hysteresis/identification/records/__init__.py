@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which records of an experiment serve which purpose, and the noise of each."""
+"""Which records of an experiment serve which purpose, their noise, and their conversion to other sample periods."""

@@ -32,6 +32,8 @@ from ...record import Experiment, Record
 from ..fit.form_uncertainty import ADEQUACY
 from .noise import noise_on_motion
 
+ADEQUATE = 1.5
+"""Mean squared ratio of residual to floor up to which nothing is missing beyond noise."""
 MAINS = (50.0, 60.0)
 """Mains frequencies [Hz]."""
 ALIKE, UNLIKE = 1e-6, 0.1

@@ -22,9 +22,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...discrepancy.changes.group_fit import fit_groups
-from ...discrepancy.changes.minute import Minute
-from ...discrepancy.changes.recalibration_history import RecalibratedNumber, numbers_of
+from ...changes.group_fit import fit_groups
+from ...changes.minute import Minute
+from ...changes.recalibration_history import RecalibratedNumber, numbers_of
 from ...model.model_file import dumps, loads
 from ...model.model_parameters import model_hash
 from ...online.change.baseline import Baseline

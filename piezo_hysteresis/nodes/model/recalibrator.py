@@ -28,9 +28,9 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from ...acquisition.sample_block import SampleBlock
-from ...discrepancy.changes.minute import Minute
-from ...discrepancy.changes.moved_group import group_to_fit
-from ...discrepancy.changes.recalibration_history import Recalibrations, write_numbers
+from ...changes.minute import Minute
+from ...changes.moved_group import group_to_fit
+from ...changes.recalibration_history import Recalibrations, write_numbers
 from ...errors import IdentificationError, PiezoError, RecordingError
 from ...model.model import Model
 from ...model.model_file import dumps, loads, save

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ...discrepancy import Diagnosis
 from ...errors import DivergenceError
 from ...identification.fit.normal_equations import Nuisance
-from ...identification.free_run_error import Errors, errors, zero_per_phase
+from ...identification.free_run_error import Errors, errors, free_per_record
 from ...identification.records.noise_floor import floors, noise_floors
 from ...model.model import Model
 from ...record import Experiment
@@ -146,6 +146,8 @@ def compare_diagnosis(found: Diagnosis) -> ModelComparison:
     if is_named and found.model is not None and found.model is not found.baseline:
         models["after"] = found.model
     try:
-        return compare(found.experiment, models, {label: zero_per_phase(model) for label, model in models.items()})
+        return compare(
+            found.experiment, models, {label: free_per_record(model, offset=True) for label, model in models.items()}
+        )
     except DivergenceError:
         return compare(found.experiment)

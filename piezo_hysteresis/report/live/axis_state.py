@@ -21,7 +21,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from ...discrepancy.changes.recalibration_history import RecalibratedNumber, read_numbers
+from ...changes.recalibration_history import RecalibratedNumber, read_numbers
 from ...errors import PiezoError
 from ...model.model import Model
 from ...model.model_file import loads

@@ -22,7 +22,7 @@ from datetime import UTC, datetime, timedelta
 from bokeh.layouts import column
 from bokeh.models import ColumnDataSource, Select, Whisker
 
-from ...discrepancy.changes.recalibration_history import RecalibratedNumber
+from ...changes.recalibration_history import RecalibratedNumber
 from ..palette import BLUE
 from .figures import MEASURED, time_figure
 

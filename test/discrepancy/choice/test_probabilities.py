@@ -43,7 +43,6 @@ from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, Backlash, BoucWen, Creep, MainsHum, ThermalDrift
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.fit import Fit
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
@@ -54,7 +53,7 @@ RECORDS = tuple(
     Record(p.voltage, np.zeros(p.voltage.size), 1e-3, p.name) for p in tiers(LIMITS)[0].phases if p.name != "rest"
 )
 DATA = TrainingData(
-    RECORDS, np.full(len(RECORDS), 5e-9), Nuisance(), Extent.of(RECORDS, STAGE.voltage_scale, STAGE.displacement_scale)
+    RECORDS, np.full(len(RECORDS), 5e-9), Extent.of(RECORDS, STAGE.voltage_scale, STAGE.displacement_scale)
 )
 PRIOR = {
     NOTHING: 0.4,

@@ -24,7 +24,6 @@ from piezo_hysteresis.discrepancy.choice.tiers import tiers
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, BoucWen, Creep, Offset, ThermalDrift
 from piezo_hysteresis.effects.extent import Extent
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
@@ -46,7 +45,6 @@ def played(count: int, stage: Model = STAGE) -> TrainingData:
     return TrainingData(
         tuple(records),
         np.full(len(records), FLOOR),
-        Nuisance(),
         Extent.of(records, STAGE.voltage_scale, STAGE.displacement_scale),
     )
 

@@ -29,7 +29,6 @@ from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import AmplifierSaturation, BoucWen, Creep, CreepFractional, GainDrift, MainsHum
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.fit import Fit
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
@@ -39,7 +38,7 @@ EXTENT = Extent(0.0, 10.0, 1e3, 10.0, 1e-5, 2e-5, 100.0, 10.0, 10.0)
 def fitted(effect, names, covariance, null=1.0):
     model = Model((BoucWen(A=0.5, beta=3.0, gamma=0.5, p1=0.0, p2=1.0), effect), 2e-5, 10.0, 1e-5)
     result = Fit(model, names, np.asarray(covariance), 1.0, (), (), (), True, 3)
-    training_data = TrainingData((), np.ones(1), Nuisance(), EXTENT, noise=np.full(1, np.sqrt(null)))
+    training_data = TrainingData((), np.ones(1), EXTENT, noise=np.full(1, np.sqrt(null)))
     return FittedCandidate(effect, training_data, Score(np.ones(3), np.zeros(len(names))), result)
 
 
@@ -82,7 +81,7 @@ def test_hum_has_the_same_amplitude_whatever_the_drive_does(amplitudes, steady):
     """Beside the mains frequency, its harmonics are free; one record in phase with the drive must not decide."""
     hum = fitted(MainsHum(), (), np.empty((0, 0)))
     record = Record(np.zeros(1000), np.zeros(1000), 1e-3)
-    data = TrainingData((record,) * len(amplitudes), np.ones(len(amplitudes)), Nuisance(hum_frequency=50.0), EXTENT)
+    data = TrainingData((record,) * len(amplitudes), np.ones(len(amplitudes)), EXTENT)
     free = tuple(np.array([0.0, a, 0.0, 0.7, 0.0, 0.6, 0.0]) for a in amplitudes)
     hum = replace(hum, training_data=data, fit=replace(hum.fit, nuisances=free))
     assert is_steady(hum) is steady

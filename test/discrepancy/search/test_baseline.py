@@ -25,7 +25,6 @@ from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.fit.fit import Fit
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.records.noise_floor import noise_floors
 from piezo_hysteresis.identification.steps.linear_start import dynamics_of
 from piezo_hysteresis.model.model import Model
@@ -50,7 +49,7 @@ def test_a_start_from_which_the_fit_fails_hides_no_later_one(monkeypatch):
         exact(Model((BoucWen(), Arx(a=(), b=(1.0,), delay=d)), PERIOD, 10.0, 1e-5)) for d in (1, 2, 3)
     )
     record = Record(np.arange(100.0), np.zeros(100), PERIOD)
-    training_data = TrainingData((record,), np.ones(1), Nuisance(), Extent.of([record], 10.0, 1e-5))
+    training_data = TrainingData((record,), np.ones(1), Extent.of([record], 10.0, 1e-5))
 
     def fitted(model, cost):
         return Fit(model, (), np.empty((0, 0)), cost, (), (), (), True, 1)

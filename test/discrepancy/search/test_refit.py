@@ -19,12 +19,11 @@ from dataclasses import replace
 import numpy as np
 
 from piezo_hysteresis.discrepancy.search.candidates import Candidate, score_model
-from piezo_hysteresis.discrepancy.search.cross_validation import ADEQUATE
 from piezo_hysteresis.discrepancy.search.refit import proceed, refit, restart
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import HYSTERESIS, AmplifierSlewLimit, Arx, Offset
 from piezo_hysteresis.effects.extent import Extent
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance
+from piezo_hysteresis.identification.records.noise_floor import ADEQUATE
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
@@ -51,7 +50,7 @@ def measured():
 def test_a_loop_that_lost_its_width_is_started_again():
     records = measured()
     extent = Extent.of(records, STAGE.voltage_scale, STAGE.displacement_scale)
-    data = TrainingData(records, np.full(len(records), NOISE), Nuisance(), extent, start=STAGE)
+    data = TrainingData(records, np.full(len(records), NOISE), extent, start=STAGE)
     bent = STAGE.with_hysteresis(NARROW)
     found = refit(bent, Candidate(SLEW_LIMIT, data, score_model(bent, data)), 9)
     assert found is not None

@@ -23,7 +23,6 @@ from piezo_hysteresis.discrepancy.search.candidates import adjusted_numbers
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData, choose_test_records
 from piezo_hysteresis.effects import Arx, BoucWen, Offset
 from piezo_hysteresis.effects.extent import Extent
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
@@ -34,9 +33,7 @@ STAGE = Model((BoucWen(A=-0.2, beta=3.0), Arx(a=(-0.5,), b=(0.5,)), Offset()), 1
 @pytest.mark.parametrize(("begins", "free"), [((0.0, 0.0), False), ((0.0, 0.01), False), ((0.0, 45.0), True)])
 def test_settling_is_free_only_where_records_begin_at_different_levels(begins, free):
     records = tuple(Record(u + np.linspace(0.0, 50.0, 100), np.zeros(100), 1e-4) for u in begins)
-    training_data = TrainingData(
-        records, np.ones(2), Nuisance(), Extent.of(records, STAGE.voltage_scale, STAGE.displacement_scale)
-    )
+    training_data = TrainingData(records, np.ones(2), Extent.of(records, STAGE.voltage_scale, STAGE.displacement_scale))
     assert ("offset.settling" in adjusted_numbers(STAGE, training_data)) is free
     assert "offset.y0" in adjusted_numbers(STAGE, training_data)
 

@@ -46,7 +46,7 @@ from piezo_hysteresis.effects import (
     UnnamedPositionMap,
 )
 from piezo_hysteresis.effects.extent import Extent
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance, residuals
+from piezo_hysteresis.identification.fit.normal_equations import residuals
 from piezo_hysteresis.identification.identified_range import outside_of
 from piezo_hysteresis.model import model_file
 from piezo_hysteresis.model.model import Model
@@ -89,9 +89,7 @@ def setup_of(plant: Model) -> BaselineSetup:
     records = tuple(played(plant, *drive, seed) for seed, drive in enumerate(drives))
     chosen, least = range(9), np.full(len(records), FLOOR)
     span = float(np.ptp([r.displacement.max() for r in records] + [0.0]))
-    data = TrainingData(
-        records[:9], least[:9], Nuisance(), Extent.of(records, PLAIN.voltage_scale, PLAIN.displacement_scale)
-    )
+    data = TrainingData(records[:9], least[:9], Extent.of(records, PLAIN.voltage_scale, PLAIN.displacement_scale))
     fit = joint(PLAIN, data, LAST)
     data, score = score_baseline(fit.model, data)
     lost = [np.zeros(r.size) for r in records]
@@ -164,7 +162,8 @@ def test_a_free_filter_bank_fits_well_but_is_refused_at_other_rates(of_friction:
     one_rate = replace(data, records=data.records[3:6], floors=data.floors[3:6], alone=())
     learnt = joint(model.with_effect(FreeBank()), one_rate, LAST).model
     before, after = (
-        np.array([np.sqrt(np.mean(e**2)) for e in residuals(m, data.records, data.nuisance)]) for m in (model, learnt)
+        np.array([np.sqrt(np.mean(e**2)) for e in residuals(m, data.records, data.free_with(m))])
+        for m in (model, learnt)
     )
     ratios = after / before
     assert ratios[3:6].mean() < 0.7, "it learns the rate that it is shown"

@@ -25,7 +25,7 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import PointCloud2
 
-from piezo_hysteresis.discrepancy.changes.recalibration_history import FILE, read_numbers
+from piezo_hysteresis.changes.recalibration_history import FILE, read_numbers
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud
 
 pytestmark = pytest.mark.nodes

@@ -16,7 +16,7 @@
 
 from datetime import UTC, datetime
 
-from piezo_hysteresis.discrepancy.changes.recalibration_history import RecalibratedNumber
+from piezo_hysteresis.changes.recalibration_history import RecalibratedNumber
 from piezo_hysteresis.report.live.history import NumberHistory
 
 

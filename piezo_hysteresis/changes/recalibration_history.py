@@ -24,10 +24,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...effects import Arx, ExtraDelay
-from ...errors import RecordingError
-from ...model.model import Model
-from ...online.change.score import GROUPS, loop_heights
+from ..effects import Arx, ExtraDelay
+from ..errors import RecordingError
+from ..model.model import Model
+from ..online.change.score import GROUPS, loop_heights
 from .group_fit import SURE, GroupFit
 
 FILE = "recalibrations.csv"

@@ -21,10 +21,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...effects import AmplifierBandwidth, ExtraResonance
-from ...identification.steps.remaining_lag import amplifier_of
-from ...model.model import Model
-from ...record import Record
+from ..effects import AmplifierBandwidth, ExtraResonance
+from ..identification.steps.remaining_lag import amplifier_of
+from ..model.model import Model
+from ..record import Record
 from .change_search import Account, ChangeSearch
 from .signatures import shaped_model
 

@@ -19,13 +19,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.residual.sampling import (
+from piezo_hysteresis.identification.records.excitation_content import excitation_content
+from piezo_hysteresis.identification.records.sampling import (
     at_period,
     common_period,
     shortened,
     slowed,
 )
-from piezo_hysteresis.identification.records.excitation_content import excitation_content
 from piezo_hysteresis.record import Record
 
 FAST = 2e-5

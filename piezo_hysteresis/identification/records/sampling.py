@@ -28,8 +28,8 @@ import numpy as np
 import scipy
 
 from ...blocks.block import Array
-from ...identification.records.excitation_content import excitation_content
 from ...record import Record
+from .excitation_content import excitation_content
 
 ENOUGH = 10_000
 """Number of samples above which a record is averaged."""

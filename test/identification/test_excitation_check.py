@@ -16,7 +16,7 @@
 
 import numpy as np
 
-from piezo_hysteresis.discrepancy.excitation_check import missing_excitation
+from piezo_hysteresis.identification.records.excitation_check import missing_excitation
 from piezo_hysteresis.record import Record
 
 TIME = 1e-3 * np.arange(2000)

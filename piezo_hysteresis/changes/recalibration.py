@@ -29,20 +29,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import Offset
-from ...errors import IdentificationError, ParameterError
-from ...identification.fit.normal_equations import Nuisance, residuals
-from ...identification.records.conditioning_split import conditioning_length, covers
-from ...identification.records.noise import without_voltage_noise
-from ...identification.records.noise_floor import floors, stroke
-from ...model.model import Model
-from ...model.provenance import LARGEST, known_error, provenance, record_errors
-from ...record import CONDITIONING, Experiment, Record
-from ..excitation_check import check_motion, moves
+from ..effects import Offset
+from ..errors import IdentificationError, ParameterError
+from ..identification.fit.normal_equations import Nuisance, residuals
+from ..identification.records.conditioning_split import conditioning_length, covers
+from ..identification.records.excitation_check import check_motion, moves
+from ..identification.records.noise import without_voltage_noise
+from ..identification.records.noise_floor import floors, stroke
+from ..model.model import Model
+from ..model.provenance import LARGEST, known_error, provenance, record_errors
+from ..record import CONDITIONING, Experiment, Record
 from .change_kinds import ParameterChange
 from .change_search import ChangeSearch
+from .changed_model import changed_model
 from .moved_group import is_as_good
-from .same_stage import changed_model
 
 Array = NDArray[np.float64]
 

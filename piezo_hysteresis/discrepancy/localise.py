@@ -23,11 +23,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.block import Array
-from ...identification.fit.normal_equations import Nuisance
-from ...model.model import Model
-from ...record import Record
-from .residual import residuals_on
+from ..blocks.block import Array
+from ..identification.free_run_error import free_per_record, residuals_on
+from ..model.model import Model
+from ..record import Record
 
 Bins = NDArray[np.intp]
 
@@ -63,14 +62,16 @@ class ResidualShare:
 
 
 def located(
-    model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float], nuisance: Nuisance
+    model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float], offset: bool = False
 ) -> tuple[ResidualShare, ...]:
-    """Shares of the residual of a model on the records `used`, along every axis; `floors` are those of all records [m].
+    """Shares of the residual of a model on the records `used`, along every axis.
+
+    The `floors` [m] are those of all records. With `offset`, the sensor zero is free in every record.
 
     Records that are neither used nor continued by one are not simulated. A model that diverges on one raises a
     DivergenceError.
     """
-    left = residuals_on(model, records, used, nuisance)
+    left = residuals_on(model, records, used, free_per_record(model, offset=offset))
     return localise([records[i] for i in used], left, [floors[i] for i in used])
 
 

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ...effects import (
+from ..effects import (
     AmplifierBandwidth,
     Creep,
     ExtraDelay,
@@ -31,7 +31,7 @@ from ...effects import (
     Softening,
     ThermalDrift,
 )
-from ...effects.sensor.second_order_low_pass import BUTTERWORTH
+from ..effects.sensor.second_order_low_pass import BUTTERWORTH
 
 BESSEL = 0.75**0.5
 """Damping ratio of a Bessel filter, whose delay is flat; a moving average of the same delay begins like it."""

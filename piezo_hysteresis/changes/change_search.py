@@ -24,9 +24,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ...identification.structure.pieces import WEIGHTS, pieces_of
-from ...model.model import Model
-from ...record import Record
+from ..identification.structure.pieces import WEIGHTS, pieces_of
+from ..model.model import Model
+from ..record import Record
 from .change_kinds import KINDS
 from .signatures import SHAPES, ChangeablePrediction, predictions
 

@@ -27,10 +27,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import Softening
-from ...model.model import Model
-from ...record import Record
-from ..search.cross_validation import ADEQUATE
+from ..effects import Softening
+from ..identification.records.noise_floor import ADEQUATE
+from ..model.model import Model
+from ..record import Record
 from .change_kinds import KINDS, LEAVES, ParameterChange
 from .change_search import DAY_TO_DAY, FARTHEST, Account, ChangeSearch
 from .explanation import UNCERTAIN, Explanation, low_pass_before, moved_resonance

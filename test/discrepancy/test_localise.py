@@ -19,10 +19,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.residual.localise import localise, located
+from piezo_hysteresis.discrepancy.localise import localise, located
 from piezo_hysteresis.effects import Arx, Softening
 from piezo_hysteresis.errors import DivergenceError
-from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
@@ -152,7 +151,7 @@ def test_a_record_that_is_not_used_is_not_simulated():
     soft = Model((Arx(a=(-1.5, 0.9), b=(0.4,)), Softening(k3=-0.08)), 1e-3, 1.0, 1e-6)
     small, far = (Record(np.linspace(0.0, top, 100), np.zeros(100), 1e-3) for top in (0.1, 1e3))
     with pytest.raises(DivergenceError):
-        located(soft, (small, far), (0, 1), (1e-9, 1e-9), Nuisance())
-    assert located(soft, (small, far), (0,), (1e-9, 1e-9), Nuisance())
+        located(soft, (small, far), (0, 1), (1e-9, 1e-9))
+    assert located(soft, (small, far), (0,), (1e-9, 1e-9))
     with pytest.raises(DivergenceError):
-        located(soft, (far, replace(small, continues=True)), (1,), (1e-9, 1e-9), Nuisance())
+        located(soft, (far, replace(small, continues=True)), (1,), (1e-9, 1e-9))

@@ -22,9 +22,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import IdentificationError
-from ...model.model import Model
-from ...online.change.score import loop_heights
+from ..errors import IdentificationError
+from ..model.model import Model
+from ..online.change.score import loop_heights
 from .signatures import shaped_model
 
 Array = NDArray[np.float64]

@@ -21,9 +21,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.changes.group_fit import fit_groups
-from piezo_hysteresis.discrepancy.changes.minute import Minute
-from piezo_hysteresis.discrepancy.changes.moved_group import changed_by, group_to_fit
+from piezo_hysteresis.changes.group_fit import fit_groups
+from piezo_hysteresis.changes.minute import Minute
+from piezo_hysteresis.changes.moved_group import changed_by, group_to_fit
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.errors import IdentificationError
 from piezo_hysteresis.model.model import Model

@@ -20,8 +20,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from piezo_hysteresis.discrepancy.residual.intersample_error import chosen_correction, intersample_error, sharp_drive
 from piezo_hysteresis.effects import Arx, BoucWen, RateDependentHysteresis
+from piezo_hysteresis.identification.records.intersample_error import chosen_correction, intersample_error, sharp_drive
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 

@@ -18,14 +18,14 @@ from dataclasses import replace
 
 import pytest
 
-from piezo_hysteresis.cli.main import main
-from piezo_hysteresis.discrepancy.changes.recalibration_history import (
+from piezo_hysteresis.changes.recalibration_history import (
     FILE,
     RecalibratedNumber,
     Recalibrations,
     read_numbers,
     write_numbers,
 )
+from piezo_hysteresis.cli.main import main
 from piezo_hysteresis.errors import RecordingError
 from piezo_hysteresis.report.recalibrations import recalibrations
 

@@ -23,10 +23,10 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from ..effects import CATALOGUE, ExcitationNeed
-from ..errors import IdentificationError
-from ..identification.records.excitation_content import SLOW, excitation_content
-from ..record import Notice, Record
+from ...effects import CATALOGUE, ExcitationNeed
+from ...errors import IdentificationError
+from ...record import Notice, Record
+from .excitation_content import SLOW, excitation_content
 
 HOLD = 1.0
 """Time for which a level must be held after a change, so that creep becomes visible [s]."""

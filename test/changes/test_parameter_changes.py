@@ -22,14 +22,15 @@ import pytest
 from benchmarks.changes import played as triangles
 from benchmarks.changes import slope_and_loop
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from piezo_hysteresis.changes.change_sentence import sentence_of
+from piezo_hysteresis.changes.changed_model import changed_model
+from piezo_hysteresis.changes.parameter_changes import find_change, is_unchanged
+from piezo_hysteresis.changes.recalibration import recalibrate
 from piezo_hysteresis.discrepancy import Conclusion, Diagnosis, Verdict, diagnose
-from piezo_hysteresis.discrepancy.changes.parameter_changes import find_change, is_unchanged
-from piezo_hysteresis.discrepancy.changes.recalibration import recalibrate
-from piezo_hysteresis.discrepancy.changes.same_stage import changed_model, sentence_of
 from piezo_hysteresis.discrepancy.diagnose import compare_with_given_model, compared_with_given, prepare
 from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
 from piezo_hysteresis.effects import CATALOGUE
-from piezo_hysteresis.identification.free_run_error import errors, zero_per_phase
+from piezo_hysteresis.identification.free_run_error import errors, free_per_record
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.records.noise_floor import floors
 from piezo_hysteresis.identification.steps.remaining_lag import amplifier_of
@@ -295,7 +296,7 @@ def test_gain_and_loop_height_that_both_have_changed_are_both_stated(model, anot
 def test_the_known_error_is_compared_in_its_own_measure(model):
     """The error that a model states is a mean over records of equal weight, and so is the error it is compared with."""
     seen = played(replace(STAGE, noise_seed=1))
-    compared = errors(model, seen, zero_per_phase(model))
+    compared = errors(model, seen, free_per_record(model, offset=True))
     left, used = 0.01 * compared.percent * compared.range, range(len(seen.records))
     for power, unchanged in ((1.3, True), (1.8, False)):
         assert is_unchanged(model, seen.records, used, [left / power**0.5] * len(used)) is unchanged
@@ -342,7 +343,7 @@ def test_the_gap_before_is_the_error_of_the_given_model(model):
     other = replace(STAGE, noise_seed=1, bend=0.6, width=0.25)
     seen = played(other, (1.0, 3.0, 10.0, 60.0))
     found = diagnose(seen, model, effects=())
-    own = errors(model, found.experiment, zero_per_phase(model))
+    own = errors(model, found.experiment, free_per_record(model, offset=True))
     by_record = {row.index: row.percent for row in own.rows}
     assert found.conclusion is not Conclusion.CHANGED_PARAMETER
     for phase in found.gap.per_phase:

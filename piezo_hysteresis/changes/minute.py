@@ -21,10 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.chain import Chain, ChainState, ChainTangent
-from ...model.model import Model
-from ...online.change.score import ChangeScore, Scores, loop_heights
-from ...online.voltage_history import DriveHistory
+from ..model.chain import Chain, ChainState, ChainTangent
+from ..model.model import Model
+from ..online.change.score import ChangeScore, Scores, loop_heights
+from ..online.voltage_history import DriveHistory
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.residual.intersample_error import quick_dynamics
 from piezo_hysteresis.effects import Arx, BoucWen
+from piezo_hysteresis.identification.records.intersample_error import quick_dynamics
 from piezo_hysteresis.model.model import Model
 
 PERIOD = 2e-5

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The residual of a model: where it is large, and what sampling adds to it."""
+"""What has changed since a model was identified: one parameter with its interval, or the numbers of a recalibration."""

@@ -26,7 +26,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import (
+from ..effects import (
     AmplifierBandwidthHeld,
     Arx,
     Creep,
@@ -39,11 +39,11 @@ from ...effects import (
     SensorBandwidth,
     Softening,
 )
-from ...errors import DivergenceError
-from ...identification.steps.remaining_lag import amplifier_of
-from ...model.chain import RUNAWAY
-from ...model.model import Model
-from ...record import Record
+from ..errors import DivergenceError
+from ..identification.steps.remaining_lag import amplifier_of
+from ..model.chain import RUNAWAY
+from ..model.model import Model
+from ..record import Record
 from .change_kinds import KINDS
 from .filtered_signal import averaged, derivatives, filtered
 

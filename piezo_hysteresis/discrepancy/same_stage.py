@@ -1,0 +1,111 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`same_stage`: diagnosis of a stage that differs from a given model in one parameter only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..changes.change_sentence import sentence_of
+from ..changes.changed_model import changed_model
+from ..changes.parameter_changes import find_change, is_unchanged
+from ..errors import DivergenceError, ModelError, ParameterError
+from ..identification.records.comparable import comparable
+from ..identification.records.noise_floor import floors, noise_floors, stroke
+from ..model.model import Model
+from ..model.provenance import MOVING, data_hash, known_error, with_stated_error
+from ..record import Experiment, Notice
+from .diagnosis import Diagnosis
+from .gap import measure_gap
+from .localise import located
+from .verdict import Conclusion
+
+HASH = "data_hash"
+"""Key of the provenance."""
+UNCHANGED = "unchanged"
+"""Kind of the notice that the given model is still as good as when it was identified."""
+
+
+def same_stage(
+    experiment: Experiment,
+    model: Model,
+    used: Sequence[int],
+    progress: Callable[[float], None],
+    given: Experiment | None = None,
+) -> Diagnosis | Notice | None:
+    """Name the parameter that has changed since `model` was identified.
+
+    The data that the model was identified from show no change.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Experiment after the change.
+    model : Model
+        Model identified before the change, from other data.
+    used : sequence of int
+        Indices of the records to explain.
+    progress : callable
+        Called with the fraction done.
+    given : Experiment, optional
+        The experiment as it was recorded, if `experiment` has been prepared.
+
+    Returns
+    -------
+    Diagnosis, Notice or None
+        The finding that nothing has changed, if the error is the known one; None if no change explains the records.
+    """
+    records = experiment.records
+    recorded = experiment if given is None else given
+    hashes = {data_hash(e) for e in (experiment, recorded, comparable(recorded)[0])}
+    if model.provenance.get(HASH) in hashes or not used:
+        return None
+    least = floors(records, noise_floors(records))
+    known = known_error(model, MOVING)
+    limits = np.maximum(least, known).tolist()
+    try:
+        if known and is_unchanged(model, records, used, limits):
+            return Notice(
+                UNCHANGED,
+                "nothing has changed since the model was identified: apart from its zero, gain and loop height, which "
+                f"differ from day to day, its error is within the known error of {1e9 * known:.3g} nm; what is missing "
+                "now was missing then",
+            )
+        change = find_change(model, records, used, limits, progress)
+        if change is None:
+            return None
+        changed = changed_model(model, change, records)
+        where = located(model, records, used, least.tolist(), offset=True)
+        both, span = (model, changed), stroke(records)
+        gap = measure_gap(both, records, list(used), least.tolist(), span, unseen=False, offset=True)
+    except (DivergenceError, ModelError, ParameterError):
+        return None
+    if not gap.after < gap.before:
+        return None
+    return Diagnosis(
+        conclusion=Conclusion.CHANGED_PARAMETER,
+        reason=sentence_of(change),
+        model=with_stated_error(changed, gap.live, stroke(records)),
+        baseline=model,
+        selection=None,
+        fit=None,
+        where=where,
+        gap=gap,
+        next_experiment=None,
+        experiment=experiment,
+        change=change,
+    )
