@@ -30,6 +30,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from piezo_hysteresis.discrepancy import Diagnosis, diagnose
+from piezo_hysteresis.discrepancy.choice.next_experiment import possible_drives
 from piezo_hysteresis.discrepancy.choice.time_to_decide import (
     ERROR_RATE,
     distances,
@@ -37,7 +38,6 @@ from piezo_hysteresis.discrepancy.choice.time_to_decide import (
     missing_log_odds,
     z_of,
 )
-from piezo_hysteresis.discrepancy.next_experiment import possible_drives
 from piezo_hysteresis.discrepancy.search.acceptance_tests import KEEPS
 from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, refit_candidates
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate, screen

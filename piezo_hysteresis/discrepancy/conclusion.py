@@ -27,10 +27,10 @@ from ..identification.records.excitation_check import missing_excitation
 from ..model.model import Model
 from ..model.provenance import with_stated_error
 from ..record import Experiment
+from .choice.next_experiment import best_next_experiment
 from .diagnosis import Diagnosis
 from .gap import Gap, measure_gap
 from .localise import ResidualShare
-from .next_experiment import best_next_experiment
 from .search.baseline_setup import BaselineSetup
 from .search.refit import LAST, PRECISE, joint, restart
 from .search.selection_result import Selection

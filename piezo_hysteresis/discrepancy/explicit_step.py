@@ -30,13 +30,13 @@ import numpy as np
 from ..blocks.block import Array
 from ..effects import BoucWen
 from ..effects.hysteresis.explicit_bouc_wen import ExplicitBoucWen
+from ..identification.fit.cross_validation import cross_validate
 from ..identification.fit.normal_equations import grams
 from ..identification.records.conditioning import with_conditioning
 from ..identification.records.sampling import at_period, is_faster, less
 from ..model.model import Model
 from ..record import Experiment, Notice, Record
 from .search.candidates import adjusted_numbers, directions
-from .search.cross_validation import cross_validate
 from .search.refit import FAILURES, LATER, joint
 from .search.training_data import TrainingData
 

@@ -26,6 +26,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from ..errors import PiezoError
+from ..identification.fit.cross_validation import Score
 from ..identification.fit.fit import Fit
 from ..identification.identify import identify
 from ..identification.records.conditioning import with_conditioning
@@ -43,7 +44,6 @@ from .gap import Gap, measure_gap
 from .localise import located
 from .search.baseline import as_conditioning, with_zero
 from .search.candidates import loop_is_off, score_model
-from .search.cross_validation import Score
 from .search.execution.cores import start_helpers
 from .search.execution.time_limit import ending_at
 from .search.record_blocks import training_data_of

@@ -22,10 +22,10 @@ import pytest
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
 from piezo_hysteresis.discrepancy.gap import Gap, PhaseGap
-from piezo_hysteresis.discrepancy.search.cross_validation import Score
 from piezo_hysteresis.discrepancy.search.selection_result import Selection
 from piezo_hysteresis.discrepancy.single_record import conclusion_of_few
 from piezo_hysteresis.effects import Arx, Backlash, BoucWen, Creep, Effect, ThermalDrift
+from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.free_run_error import errors
 from piezo_hysteresis.identification.identify import identify

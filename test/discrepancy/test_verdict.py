@@ -20,12 +20,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
-from piezo_hysteresis.discrepancy.search.cross_validation import Score
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.discrepancy.verdict import is_explained
 from piezo_hysteresis.effects import Arx, BoucWen, Creep
 from piezo_hysteresis.effects.extent import Extent
+from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record

@@ -25,10 +25,10 @@ from collections.abc import Collection, Mapping
 import numpy as np
 import scipy
 
+from ...identification.fit.cross_validation import Score
 from ...identification.fit.form_uncertainty import PIECES
 from ...identification.records.noise_floor import ADEQUATE
 from ..diagnosis import Diagnosis
-from ..search.cross_validation import Score
 from ..search.selection_result import Step
 from ..verdict import FAR, NAMED, NAMED_FAR, Verdict
 from .time_to_decide import ONE_RECORD

@@ -19,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...effects import AmplifierSaturation, MainsHum
+from ...identification.fit.cross_validation import Score
 from .candidate_refits import LEAST_GAIN
 from .candidates import FittedCandidate
-from .cross_validation import Score
 from .refit import without
 from .selection_result import Rejection, explained, typical
 

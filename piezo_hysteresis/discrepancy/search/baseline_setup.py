@@ -28,6 +28,7 @@ import numpy as np
 from ...blocks.block import Array
 from ...effects.extent import Extent
 from ...errors import DivergenceError
+from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.form_uncertainty import ADEQUACY
 from ...identification.records.conditioning import records_to_fit
@@ -38,7 +39,6 @@ from ...model.model import Model
 from ...record import Record
 from .baseline import exact, modal_models, start_models
 from .candidates import score_baseline, score_model
-from .cross_validation import Score
 from .execution.cores import start_helpers
 from .refit import FAILURES, LAST, PRECISE, joint
 from .selection_result import Selection

@@ -33,10 +33,10 @@ from ...blocks.block import Array
 from ...effects import Arx, Effect, MainsHum, Offset
 from ...errors import DivergenceError, ModelError, ParameterError
 from ...identification.fit.bounded_step import room_of
+from ...identification.fit.cross_validation import Score, cross_validate, indispensable
 from ...identification.fit.fit import Fit, gauge
 from ...identification.fit.normal_equations import Gram, grams
 from ...model.model import Model
-from .cross_validation import Score, cross_validate, indispensable
 from .execution.cores import on_cores
 from .training_data import TrainingData
 

@@ -26,13 +26,13 @@ from dataclasses import dataclass
 from functools import partial, reduce
 
 from ...errors import DivergenceError, IdentificationError, ModelError, ParameterError
+from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit, fit
 from ...identification.steps.dynamics import Dynamics, identify_arx
 from ...identification.steps.linear_start import FEW_ITERATIONS, ITERATIONS, form_of, hysteresis_signals, with_dynamics
 from ...identification.steps.modes import identify_modes
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate, adjusted_numbers, score_model
-from .cross_validation import Score
 from .execution.cores import on_cores
 from .execution.time_limit import check_time
 from .training_data import TrainingData

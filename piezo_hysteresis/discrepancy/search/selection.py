@@ -23,6 +23,7 @@ from collections.abc import Collection
 from contextlib import suppress
 
 from ...effects import CATALOGUE, Effect
+from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Progress
 from ...identification.fit.normal_equations import residuals
 from ...identification.records.noise_floor import ADEQUATE
@@ -37,7 +38,6 @@ from .candidate_refits import (
     simplest,
 )
 from .candidates import BY_COST, FittedCandidate, screen
-from .cross_validation import Score
 from .execution.time_limit import TimeSpentError
 from .selection_result import Rejection, Selection, Step
 from .training_data import TrainingData

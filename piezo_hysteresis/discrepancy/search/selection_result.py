@@ -20,9 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...identification.fit.cross_validation import Score
 from ...model.model import Model
 from .candidates import Candidate, FittedCandidate
-from .cross_validation import Score
 from .training_data import TrainingData
 
 MANY = 8

@@ -31,6 +31,7 @@ from ...effects import (
     ThermalDrift,
 )
 from ...errors import PiezoError
+from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit
 from ...identification.identification import Identification
 from ...identification.steps.remaining_lag import AMPLIFIERS
@@ -44,7 +45,6 @@ from ...identification.structure.uncertainty import as_fit
 from ...model.model import Model
 from ...record import Record
 from .candidates import FittedCandidate, score_model
-from .cross_validation import Score
 from .selection_result import Step
 from .training_data import TrainingData
 

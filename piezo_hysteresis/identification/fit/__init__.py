@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The joint least-squares fit in free run, and its covariance."""
+"""The joint least-squares fit in free run, its covariance, and scores on records that were left out of it."""

@@ -23,11 +23,11 @@ from piezo_hysteresis.discrepancy.search import acceptance_tests
 from piezo_hysteresis.discrepancy.search.acceptance_tests import bends_all_along, first_rejection, is_steady
 from piezo_hysteresis.discrepancy.search.candidate_refits import simplest
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
-from piezo_hysteresis.discrepancy.search.cross_validation import Score
 from piezo_hysteresis.discrepancy.search.refit import Fitted
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import AmplifierSaturation, BoucWen, Creep, CreepFractional, GainDrift, MainsHum
 from piezo_hysteresis.effects.extent import Extent
+from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record

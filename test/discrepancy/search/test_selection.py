@@ -19,10 +19,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.search.cross_validation import Score
 from piezo_hysteresis.discrepancy.search.selection import select
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, explained
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
+from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.records.noise_floor import ADEQUATE
 
 

@@ -17,7 +17,7 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.search.cross_validation import Score, cross_validate, indispensable
+from piezo_hysteresis.identification.fit.cross_validation import Score, cross_validate, indispensable
 from piezo_hysteresis.identification.fit.normal_equations import Gram
 
 RANDOM = np.random.default_rng(5)

@@ -20,13 +20,13 @@ import math
 
 import numpy as np
 
-from ..identification.protocol.drive_limits import DriveLimits
-from ..identification.protocol.phases import ProtocolPhase
-from ..record import CONDITIONING
-from .choice.tiers import spare_drives, tiers
-from .choice.time_to_decide import ERROR_RATE, LONGEST, Separation, best_drive, missing_log_odds
-from .search.selection_result import Selection
-from .search.training_data import TrainingData
+from ...identification.protocol.drive_limits import DriveLimits
+from ...identification.protocol.phases import ProtocolPhase
+from ...record import CONDITIONING
+from ..search.selection_result import Selection
+from ..search.training_data import TrainingData
+from .tiers import spare_drives, tiers
+from .time_to_decide import ERROR_RATE, LONGEST, Separation, best_drive, missing_log_odds
 
 FINEST = 1e-5
 """Shortest sample period of the drives to choose from [s]."""

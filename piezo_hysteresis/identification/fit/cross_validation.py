@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...blocks.block import Array
-from ...identification.fit.normal_equations import Gram
+from .normal_equations import Gram
 
 RIDGE = 1e-9
 """Relative size below which a direction of the parameters counts as undetermined and is not changed."""
