@@ -15,9 +15,9 @@
 """A third simulated stage, similar to measured nanopositioners; it shares no code with `effects` or `stage`.
 
 Plays whose weights depend on the level, cubic and square, creep of one rate before and another after about a third of a
-second, a lightly damped mode, a pole and a delay, and what a lab changes between two recordings: a filter, a delay, a
-softer spring, a drift, half a per cent from day to day. Everything runs on a grid finer than the samples; the converter
-holds every sample, and a record begins with a step from 0 V, holds, and goes on with sines that grow.
+second, a lightly damped mode or two, a pole and a delay, and what a lab changes between two recordings: a filter, a
+delay, a softer spring, a drift, half a per cent from day to day. Everything runs on a grid finer than the samples; the
+converter holds every sample, and a record begins with a step from 0 V, holds, and goes on with sines that grow.
 """
 
 from __future__ import annotations
@@ -84,6 +84,8 @@ class Nanopositioner:
     creep_slow: float = 0.014
     mode: float = 600.0
     zeta: float = 0.03
+    second_share: float = 0.0
+    second_mode: float = 1000.0
     pole: float = 1e-4
     delay: float = 6e-5
     noise: float = 2e-4
@@ -174,11 +176,17 @@ class Nanopositioner:
         return float(period * np.sum(1.0 - response / response[-1]))
 
     def _mechanics(self, w: Array, dt: float) -> Array:
-        o = 2.0 * np.pi * self.mode
+        x = (1.0 - self.second_share) * self._resonant(w, self.mode, dt)
+        if self.second_share:
+            x += self.second_share * self._resonant(w, self.second_mode, dt)
+        return self._late(x, self.delay, self.pole, dt)
+
+    def _resonant(self, w: Array, frequency: float, dt: float) -> Array:
+        o = 2.0 * np.pi * frequency
         system = ([[0.0, 1.0], [-o * o, -2.0 * self.zeta * o]], [[0.0], [o * o]], [[1.0, 0.0]], [[0.0]])
         a, b, c, _, _ = cont2discrete(tuple(np.array(m) for m in system), dt)
         den = np.poly(a)
-        return self._late(np.asarray(lfilter(np.poly(a - b @ c) - den, den, w)), self.delay, self.pole, dt)
+        return np.asarray(lfilter(np.poly(a - b @ c) - den, den, w))
 
     def _filtered(self, x: Array, dt: float) -> Array:
         if self.filter_mean:  # the mean of the last samples, which is so much later

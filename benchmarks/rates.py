@@ -68,6 +68,8 @@ FILTERS = {
     "filter_mean": "delay of a moving average behind the sensor",
 }
 """Options for a low-pass in the chain, and what their number is."""
+SECOND = 1.5
+"""Frequency of a second mode, in units of the first."""
 Values = tuple[float, ...]
 """Frequencies [Hz], or levels."""
 PROMISED = {
@@ -128,6 +130,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first stage")
     parser.add_argument("--period", type=float, default=PERIOD, help="sample period [s]")
     parser.add_argument("--voltage-noise", type=float, default=0.0, help="of the fitted records [V]")
+    parser.add_argument("--second-mode", type=float, default=0.0, metavar="SHARE", help="of a second mode")
     for name, help in FILTERS.items():
         parser.add_argument(f"--{name}", type=float, default=0.0, metavar="TIME", help=f"{help} [s]")
 
@@ -141,7 +144,9 @@ def run(options: argparse.Namespace) -> list[Figures]:
     filtered = {name: getattr(options, name) for name in FILTERS}
     for seed in range(options.first, options.first + options.stages):
         rng = np.random.default_rng(seed)
-        stage = Nanopositioner.random(rng, mode=float(rng.uniform(250.0, 800.0)), **filtered)
+        mode = float(rng.uniform(250.0, 800.0))
+        stage = Nanopositioner.random(rng, mode=mode, second_share=options.second_mode, **filtered)
+        stage = replace(stage, second_mode=SECOND * mode)
         for what, fitted, levels, judged in cases(low, middle, high):
             recorded = measured(played(stage, fitted, levels, period), options.voltage_noise, rng)
             identified = identify(recorded, memory=True)

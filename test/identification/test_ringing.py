@@ -14,10 +14,14 @@
 
 """A lightly damped mode is found wherever the drive excites it: the turns of a triangle make it ring as steps do."""
 
+import re
+
 import numpy as np
+import pytest
 from scipy.signal import sawtooth
 
-from benchmarks.nanopositioner import Nanopositioner
+from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from piezo_hysteresis.identification.free_run_error import errors, free_per_record
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.record import Experiment
 
@@ -51,3 +55,24 @@ def test_a_mode_that_only_triangles_excite_is_fitted_and_named():
     other = stage.play(triangle(20.0), PERIOD)
     error = (other.displacement - found.model.simulate(other)[0])[100:]
     assert np.std(error) < 3e-3 * np.ptp(other.displacement)
+
+
+@pytest.mark.parametrize("share", [0.06, 0.3])
+def test_two_modes_are_described_at_a_rate_left_out(share):
+    """The stage rings at 400 and 650 Hz; without the second mode, the error is up to 0.8 % of the range."""
+    stage = Nanopositioner(mode=400.0, zeta=0.02, second_share=share, second_mode=650.0)
+    drives = {f: growing_sine(f, PERIOD) for f in (1.0, 10.0, 60.0)}
+    played = {f: stage.play(u, PERIOD, f"sine_{f:g}hz") for f, u in drives.items()}
+    found = identify(Experiment((played[1.0], played[60.0])), memory=True)
+    assert errors(found.model, Experiment((played[10.0],)), free_per_record(found.model, offset=True)).percent < 0.1
+    assert found.model["extra_resonance"]["f0"] == pytest.approx(400.0, abs=2.0)
+    (said,) = (n.message for n in found.notices if n.kind == "ringing")
+    second = float(re.search(r"one at ([0-9.]+) Hz", said)[1])
+    assert second == pytest.approx(650.0, abs=5.0)
+
+
+def test_one_mode_is_not_taken_for_two():
+    stage = Nanopositioner(mode=769.0, zeta=0.043, pole=2e-4)
+    played = tuple(stage.play(growing_sine(f, PERIOD), PERIOD, f"sine_{f:g}hz") for f in (1.0, 10.0))
+    (said,) = (n.message for n in identify(Experiment(played), memory=True).notices if n.kind == "ringing")
+    assert "one at" not in said

@@ -22,12 +22,11 @@ import numpy as np
 
 from ...effects import Arx, ExtraResonance
 from ...model.model import Model
-from ..steps.linear_start import dynamics_of
-from .mode import SHAPE, SHARE, held_by, mode_is_inferred, rings_as_a_whole, with_mode
-from .piece_fit import DELAY, POLE, Array, PieceFit
+from .mode import DAMPING, SHAPE, SHARE, held_by, mode_is_inferred, rings_as_a_whole, with_mode
+from .piece_fit import DELAY, Array, PieceFit
 from .pieces import Kind, RecordPiece
-from .pole_place import LinearPart, in_every_place
-from .ringing import decay_after_steps, sampled_decay
+from .pole_place import LinearPart, in_every_place, real_poles, with_pole
+from .ringing import decay_after_steps, ringing_lines, sampled_decay
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
 from .structure_fit import fit_structure, misfit_of
 
@@ -44,8 +43,8 @@ SETTLED = 4.0
 SLOW = 0.8
 """Largest real pole that is added; a slower one, which a zero nearly cancels, would take the place of creep."""
 SECOND = 0.5
-"""Beside a ringing mode, dynamics of second order are accepted if at most this share of the power after a step remains;
-without one, `DESCRIBED` counts."""
+"""Beside a ringing mode, dynamics of second order or a second mode are accepted if at most this share of the power
+after a step remains; without one, `DESCRIBED` counts."""
 POLE_GAINS = 0.98
 """A pole is accepted if at most this share of the cost remains."""
 RESOLVES = 0.005
@@ -55,7 +54,7 @@ CONTRADICTED = 0.5
 
 
 def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> LinearPart:
-    """Fit a delay, and if they help: a mode, a pole or dynamics of second order, two more orders.
+    """Fit a delay, and if they help: a mode, a pole or dynamics of second order, two more orders or a second mode.
 
     Parameters
     ----------
@@ -69,6 +68,7 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in LAGS]
     plain = min(found, key=lambda f: f.cost)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
+    best = _with_second_mode(best, pieces, floors)
     best, *others = in_every_place(best, pieces, floors)
     fast = _with_two_more_orders(plain, best, pieces, floors)
     if fast is not best:
@@ -106,8 +106,9 @@ def _with_poles_and_mode(
         begun = [f for f in dict.fromkeys((best, lagging)) if f.model[Arx.name].array("a").size]
         tried = [_with_second_order(f, pieces, floors) for f in begun]
         tried = [f if ExtraResonance.name in f.model else with_mode(f, pieces, floors) for f in tried]
-        slowest = max(SLOW, *(_slowest_pole(f.model) for f in (best, lagging)))
-        second = min((f for f in tried if not _slowest_pole(f.model) > slowest), key=lambda f: f.cost, default=best)
+        slowest = max([SLOW, *real_poles(best.model), *real_poles(lagging.model)])
+        quick = [f for f in tried if all(pole <= slowest for pole in real_poles(f.model))]
+        second = min(quick, key=lambda f: f.cost, default=best)
         share = SECOND if set(SHAPE) <= set(second.names) else DESCRIBED
         if _after_steps(second, pieces) < share * _after_steps(best, pieces):
             best, without = second, lagging
@@ -118,9 +119,8 @@ def _with_pole(start: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[
     """The fit with a pole, if it lowers the cost by enough."""
     held, poles = held_by(start), []
     for pole in START_POLES:
-        arx = Arx(a=(-pole,), b=(1.0 - pole,), delay=start.model[Arx.name]["delay"])
-        tried = fit_structure(start.model.with_effect(arx), pieces, floors, held)
-        if tried.model.values()[POLE] < 0.0:
+        tried = fit_structure(with_pole(start.model, pole), pieces, floors, held)
+        if real_poles(tried.model):
             poles.append(tried)
     lagging = min(poles, key=lambda f: f.cost, default=start)
     return lagging if lagging.cost < POLE_GAINS * start.cost else start
@@ -136,11 +136,6 @@ def _with_factor(model: Model, factor: Sequence[float] | Array) -> Model:
     arx = model[Arx.name]
     a, b = (np.convolve(c, factor).tolist() for c in ((1.0, *arx.array("a")), arx.array("b")))
     return model.with_effect(Arx(a=tuple(a[1:]), b=tuple(b), delay=arx["delay"]))
-
-
-def _slowest_pole(model: Model) -> float:
-    """The largest pole of the dynamics that is real and positive; 0 without any."""
-    return max((float(p.real) for p in dynamics_of(model).poles if p.imag == 0.0 and p.real > 0.0), default=0.0)
 
 
 def _lead(without: PieceFit, found: PieceFit) -> float:
@@ -162,12 +157,30 @@ def _with_two_more_orders(
     if rings and not _after_steps(best, pieces) > RESOLVES * _after_steps(plain, pieces):  # also without any step
         return best
     before = plain if ExtraResonance.name in best.model else best
-    decay = sampled_decay(best.model) if rings else decay_after_steps(before.model, pieces)
+    decay = (
+        sampled_decay(best.model.effect(ExtraResonance), best.model.sample_period)
+        if rings
+        else decay_after_steps(before.model, pieces)
+    )
     if decay is None:
         return best
     found = fit_structure(_with_factor(before.model, decay), pieces, floors)
     describes = _after_steps(found, pieces) < DESCRIBED * _after_steps(best, pieces)
     return found if describes and found.cost < best.cost else best
+
+
+def _with_second_mode(best: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
+    """The fit with ARX of two more orders for a second mode beside the first, if the residual rings; else `best`."""
+    rings = ExtraResonance.name in best.model and not mode_is_inferred(best.model)
+    if not (rings and np.inf > _after_steps(best, pieces) > SETTLED):
+        return best
+    lines = [ExtraResonance(r=1.0, f0=f, zeta=DAMPING) for f, _ in ringing_lines(best.model, pieces)]
+    models = [_with_factor(best.model, sampled_decay(line, best.model.sample_period)) for line in lines]
+    tried = [fit_structure(m, pieces, floors, held_by(best)) for m in models]
+    found = min(tried, key=lambda f: f.cost, default=best)
+    if not _after_steps(found, pieces) < SECOND * _after_steps(best, pieces):
+        return best
+    return found if real_poles(found.model) else _with_pole(found, pieces, floors)
 
 
 def _after_steps(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:

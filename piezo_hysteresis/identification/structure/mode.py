@@ -117,16 +117,20 @@ def lag_of_mode(model: Model) -> float:
 
 def mode_notices(fit: PieceFit) -> list[Notice]:
     """``ringing`` with the numbers of the mode, if there is one; one that does not ring has the assumed damping."""
+    rings = [p for p in dynamics_of(fit.model).poles if p.imag >= 0.0 and _damping(p) <= RINGS]
     if ExtraResonance.name not in fit.model:
-        poles = dynamics_of(fit.model).poles
-        if not any(_damping(p) <= RINGS for p in poles):
+        if not rings:
             return []
-        said = f"the stage rings after steps; ARX of order {poles.size} describes its samples better than a mode does"
+        order = dynamics_of(fit.model).poles.size
+        said = f"the stage rings after steps; ARX of order {order} describes its samples better than a mode does"
         return [Notice("ringing", said)]
     mode = fit.model[ExtraResonance.name]
     shown = f"a mode at {mode['f0']:.4g} Hz with"
     if not mode_is_inferred(fit.model):
         said = f"the stage rings after steps or sharp turns: {shown} a damping ratio of {mode['zeta']:.2g}"
+        for pole in (p for p in rings if p.imag > 0.0):  # a negative pole is none of a mode that the samples show
+            frequency = abs(np.log(pole)) / (2.0 * np.pi * fit.model.sample_period)
+            said += f", and one at {frequency:.4g} Hz in the ARX dynamics with {_damping(pole):.2g}"
     else:
         said = (
             f"the gain changes with the frequency of the drive; {shown} a share of {mode['r']:.3g} stands for this, "

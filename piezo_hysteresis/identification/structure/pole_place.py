@@ -29,6 +29,7 @@ import numpy as np
 from ...effects import Arx, ExtraResonance
 from ...model.model import Model
 from ...record import Notice
+from ..steps.linear_start import dynamics_of
 from ..steps.remaining_lag import AMPLIFIERS, amplifier_of, lag_beside_mode
 from .mode import held_by, lag_of_mode, mode_notices
 from .piece_fit import PieceFit
@@ -96,12 +97,12 @@ class LinearPart:
 
 
 def in_every_place(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> list[PieceFit]:
-    """The fit, and if its dynamics are a pole, those with it before the hysteresis instead; the best one first."""
-    arx = found.model[Arx.name]
-    if arx.array("a").size != 1:
+    """The fit, and if its dynamics have one pole, those with it before the hysteresis instead; the best one first."""
+    poles = real_poles(found.model)
+    if len(poles) != 1:
         return [found]
-    tau = -found.model.sample_period / float(np.log(-arx.array("a")[0]))
-    bare = found.model.with_effect(Arx(a=(), b=(1.0,), delay=arx["delay"]))
+    tau = -found.model.sample_period / float(np.log(poles[0]))
+    bare = _without_pole(found.model, poles[0])
     forms = (bare.with_effect(form(tau=min(tau, form.parameters[0].upper))) for form in AMPLIFIERS)
     tried = (fit_structure(model, pieces, floors, held_by(found)) for model in forms)
     return sorted((found, *tried), key=lambda f: f.cost)
@@ -113,8 +114,28 @@ def with_pole_behind(model: Model) -> Model:
     if amplifier is None:
         return model
     pole = float(np.exp(-model.sample_period / amplifier["tau"])) if amplifier["tau"] > 0.0 else 0.0
-    arx = Arx(a=(-pole,), b=(1.0 - pole,), delay=model[Arx.name]["delay"])
-    return model.without(amplifier.name).with_effect(arx)
+    return with_pole(model.without(amplifier.name), pole)
+
+
+def real_poles(model: Model) -> list[float]:
+    """The poles of the dynamics that are real and positive."""
+    return [float(p.real) for p in dynamics_of(model).poles if p.imag == 0.0 and p.real > 0.0]
+
+
+def with_pole(model: Model, pole: float) -> Model:
+    """The model with one more pole in its dynamics, at the same dc gain."""
+    arx = dynamics_of(model)
+    a = np.convolve((1.0, *arx.array("a")), (1.0, -pole))
+    b = (1.0 - pole) * arx.array("b")
+    return model.with_effect(Arx(a=tuple(a[1:].tolist()), b=tuple(b.tolist()), delay=arx["delay"]))
+
+
+def _without_pole(model: Model, pole: float) -> Model:
+    """The model without this pole of its dynamics, at the same dc gain."""
+    arx = dynamics_of(model)
+    a = np.polydiv(np.append(1.0, arx.array("a")), np.array([1.0, -pole]))[0]
+    b = arx.array("b") / (1.0 - pole)
+    return model.with_effect(Arx(a=tuple(a[1:].tolist()), b=tuple(b.tolist()), delay=arx["delay"]))
 
 
 def _lag(model: Model) -> float:

@@ -159,9 +159,8 @@ def decay_after_steps(model: Model, pieces: Sequence[RecordPiece]) -> Array | No
     return decay if np.abs(np.roots(decay)).max(initial=0.0) < LONGEST else None
 
 
-def sampled_decay(model: Model) -> Array:
-    """The same coefficients of the samples of a mode with the frequency and damping of the mode of `model`."""
-    mode = model[ExtraResonance.name]
-    angle = 2.0 * np.pi * mode["f0"] * model.sample_period
+def sampled_decay(mode: ExtraResonance, period: float) -> Array:
+    """The same coefficients of the samples of a mode."""
+    angle = 2.0 * np.pi * mode["f0"] * period
     pole = np.exp(angle * (1j * np.sqrt(1.0 - mode["zeta"] ** 2) - mode["zeta"]))
     return np.array([1.0, -2.0 * pole.real, abs(pole) ** 2])

@@ -22,10 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import MEMORY, Creep, CreepTwoRates, EvenInputPolynomial
+from ...effects import MEMORY, Arx, Creep, CreepTwoRates, EvenInputPolynomial
 from ..fit.bounded_step import bounded_step
 from ..steps.linear_start import dynamics_of
-from .piece_fit import GAIN, POLE, STIFF, PieceFit
+from .piece_fit import GAIN, STIFF, PieceFit
 from .pieces import WEIGHTS, Kind, RecordPiece
 
 Array = NDArray[np.float64]
@@ -184,9 +184,13 @@ def _space(full: PieceFit, structure: ModelStructure) -> tuple[Array, Array, Arr
         free[slow, fast] = 1.0
         fixed[slow] = values[FAST] - values[SLOW]
         kept.remove(slow)
-    if GAIN in full.names and (lag := full.names.index(GAIN)) in kept:
-        free[lag, full.names.index(POLE)] = dynamics_of(full.model).dc_gain  # G(1) is constant
-        kept.remove(lag)
+    if GAIN in full.names and (gain := full.names.index(GAIN)) in kept:  # G(1) is constant
+        for k, name in enumerate(full.names):
+            if name.startswith(f"{Arx.name}.a["):
+                free[gain, k] = dynamics_of(full.model).dc_gain
+            elif name.startswith(f"{Arx.name}.b[") and k != gain:
+                free[gain, k] = -1.0
+        kept.remove(gain)
     return free[:, kept], fixed, low[kept], high[kept]
 
 

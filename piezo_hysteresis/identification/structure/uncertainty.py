@@ -25,8 +25,9 @@ from ...errors import IdentificationError
 from ..fit.fit import Fit
 from ..steps.remaining_lag import amplifier_of
 from .mode import SHAPE, SHARE, mode_is_inferred
-from .piece_fit import DELAY, POLE, Array, PieceFit, free_directions
+from .piece_fit import DELAY, Array, PieceFit, free_directions
 from .pieces import Kind, RecordPiece
+from .pole_place import real_poles
 from .prior import INDEPENDENT
 from .scores import FAST, Judged
 
@@ -143,7 +144,7 @@ def _open_forms(found: PieceFit) -> float:
     The form of an inferred mode is open even beside a pole.
     """
     values = found.model.values()
-    lagging = amplifier_of(found.model) is not None or values.get(POLE, 0.0) < -NO_POLE
+    lagging = amplifier_of(found.model) is not None or max(real_poles(found.model), default=0.0) > NO_POLE
     has_pole = lagging and not mode_is_inferred(found.model)
     off = values[SHARE] - 1.0 if {SHARE, *SHAPE} <= set(found.names) else 0.0
     return float(not has_pole) + off * off
