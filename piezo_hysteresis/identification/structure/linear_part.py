@@ -32,6 +32,8 @@ from .structure_fit import fit_structure, misfit_of
 
 LAGS = (0.3, 1.5, 4.0)
 """Start values of the delay [samples]."""
+LATE = 20
+"""Delay of the response to a step that is a further start value [samples]."""
 DESCRIBED = 0.1
 """Two more orders of the ARX dynamics are accepted if at most this share of the power after a step remains."""
 START_POLES = (0.3, 0.8)
@@ -65,7 +67,8 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     floors : sequence of float
         Floor of every record [m].
     """
-    found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in LAGS]
+    lags = (*LAGS, *_late_responses(pieces))
+    found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in lags]
     plain = min(found, key=lambda f: f.cost)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
     best = _with_second_mode(best, pieces, floors)
@@ -78,6 +81,20 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     if misfit_beside_steps(other, pieces) < CONTRADICTED * misfit_beside_steps(best, pieces):
         return LinearPart(other, lead, late=lateness_of_steps(other, pieces))
     return LinearPart(best, lead, others)
+
+
+def _late_responses(pieces: Sequence[RecordPiece]) -> list[float]:
+    """The delay of half the height of the first step, as a further start if it is long [samples].
+
+    From a short delay, a fit does not find one of more than half a cycle of the fastest drive.
+    """
+    step = next((k for k, p in enumerate(pieces) if p.kind is Kind.STEP), None)
+    if step is None:
+        return []
+    response = np.concatenate([p.record.displacement for p in pieces[step : step + 2]])  # with the hold
+    rise = np.abs(response - response[0])
+    late = int(np.argmax(rise > 0.5 * rise.max()))
+    return [float(late)] if late > LATE else []
 
 
 def _with_poles_and_mode(
