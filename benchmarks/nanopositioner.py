@@ -57,6 +57,16 @@ def level_plays(v, radii, weights, bends):
 
 
 @kernel
+def slewed(v, reach):
+    """The drive behind an amplifier that changes by at most `reach` per step of the plant, from 0."""
+    out, held = np.empty(v.size), 0.0
+    for i in range(v.size):
+        held = min(max(v[i], held - reach), held + reach)
+        out[i] = held
+    return out
+
+
+@kernel
 def elements(w, dt, taus, weights):
     """Σ of weighted first-order elements that were settled at 0."""
     out = np.zeros(w.size)
@@ -91,6 +101,7 @@ class Nanopositioner:
     noise: float = 2e-4
     zero: float = 1e-6
     gain: float = 1.0
+    slew: float = 0.0
     filter_drive: float = 0.0
     filter_delay: float = 0.0
     filter_pole: float = 0.0
@@ -137,7 +148,10 @@ class Nanopositioner:
     def play(self, drive: Array, period: float, phase: str = "record") -> Record:
         """Record of a drive [V] that follows a rest at 0 V, sampled at `period` [s]."""
         dt = period / FINER
-        v = self._late(np.repeat(drive, FINER) / self.volt, 0.0, self.filter_drive, dt)
+        v = np.repeat(drive, FINER) / self.volt
+        if self.slew:
+            v = slewed(v, self.slew * dt / self.volt)
+        v = self._late(v, 0.0, self.filter_drive, dt)
         x = self._mechanics(self._creep(self._hysteresis(v), dt), dt)
         if self.softening:
             for _ in range(3):
@@ -170,7 +184,7 @@ class Nanopositioner:
         A mode near a multiple of the sampling rate resonates with the steps of the converter, so that the samples have
         another lag than that of the stage and half a sample.
         """
-        exact = replace(self, zero=0.0, noise=0.0, softening=0.0, drift=0.0)
+        exact = replace(self, slew=0.0, zero=0.0, noise=0.0, softening=0.0, drift=0.0)
         linear = replace(exact, loop=0.0, bend=0.0, cubic=0.0, square=0.0, creep_fast=0.0, creep_slow=0.0)
         response = linear.play(np.full(round(RINGS / period), self.volt), period).displacement
         return float(period * np.sum(1.0 - response / response[-1]))

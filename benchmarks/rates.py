@@ -130,6 +130,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first stage")
     parser.add_argument("--period", type=float, default=PERIOD, help="sample period [s]")
     parser.add_argument("--voltage-noise", type=float, default=0.0, help="of the fitted records [V]")
+    parser.add_argument("--slew", type=float, default=0.0, metavar="SLOPE", help="largest slope of the amplifier [V/s]")
     parser.add_argument("--second-mode", type=float, default=0.0, metavar="SHARE", help="of a second mode")
     for name, help in FILTERS.items():
         parser.add_argument(f"--{name}", type=float, default=0.0, metavar="TIME", help=f"{help} [s]")
@@ -146,7 +147,7 @@ def run(options: argparse.Namespace) -> list[Figures]:
         rng = np.random.default_rng(seed)
         mode = float(rng.uniform(250.0, 800.0))
         stage = Nanopositioner.random(rng, mode=mode, second_share=options.second_mode, **filtered)
-        stage = replace(stage, second_mode=SECOND * mode)
+        stage = replace(stage, second_mode=SECOND * mode, slew=options.slew)
         for what, fitted, levels, judged in cases(low, middle, high):
             recorded = measured(played(stage, fitted, levels, period), options.voltage_noise, rng)
             identified = identify(recorded, memory=True)

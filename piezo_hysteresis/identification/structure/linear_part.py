@@ -20,13 +20,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...effects import Arx, ExtraResonance
+from ...effects import AmplifierSlewLimit, Arx, ExtraResonance
 from ...model.model import Model
 from .mode import DAMPING, SHAPE, SHARE, held_by, mode_is_inferred, rings_as_a_whole, with_mode
 from .piece_fit import DELAY, Array, PieceFit
 from .pieces import Kind, RecordPiece
 from .pole_place import LinearPart, in_every_place, real_poles, with_pole
 from .ringing import decay_after_steps, ringing_lines, sampled_decay
+from .step_edge import with_slew_limit
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
 from .structure_fit import fit_structure, misfit_of
 
@@ -46,7 +47,7 @@ SLOW = 0.8
 """Largest real pole that is added; a slower one, which a zero nearly cancels, would take the place of creep."""
 SECOND = 0.5
 """Beside a ringing mode, dynamics of second order or a second mode are accepted if at most this share of the power
-after a step remains; without one, `DESCRIBED` counts."""
+after a step remains; without one, `DESCRIBED` counts. So is a largest slope of the drive."""
 POLE_GAINS = 0.98
 """A pole is accepted if at most this share of the cost remains."""
 RESOLVES = 0.005
@@ -71,8 +72,18 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in lags]
     plain = min(found, key=lambda f: f.cost)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
+    if np.inf > _after_steps(best, pieces) > SETTLED:
+        limited = with_slew_limit(best, pieces, floors)
+        if _after_steps(limited, pieces) < SECOND * _after_steps(best, pieces):
+            best = limited
+            if ExtraResonance.name not in best.model:
+                best = with_mode(limited, pieces, floors)
+                lead = _lead(limited, best)
+            best = best if real_poles(best.model) else _with_pole(best, pieces, floors)
     best = _with_second_mode(best, pieces, floors)
     best, *others = in_every_place(best, pieces, floors)
+    if AmplifierSlewLimit.name not in best.model:
+        others.append(with_slew_limit(best, pieces, floors))  # it may be as likely as a pole or a delay
     fast = _with_two_more_orders(plain, best, pieces, floors)
     if fast is not best:
         return LinearPart(fast, 0.0)
@@ -194,7 +205,7 @@ def _with_second_mode(best: PieceFit, pieces: Sequence[RecordPiece], floors: Seq
     lines = [ExtraResonance(r=1.0, f0=f, zeta=DAMPING) for f, _ in ringing_lines(best.model, pieces)]
     models = [_with_factor(best.model, sampled_decay(line, best.model.sample_period)) for line in lines]
     tried = [fit_structure(m, pieces, floors, held_by(best)) for m in models]
-    found = min(tried, key=lambda f: f.cost, default=best)
+    found = min((f for f in tried if rings_as_a_whole(f.model)), key=lambda f: f.cost, default=best)
     if not _after_steps(found, pieces) < SECOND * _after_steps(best, pieces):
         return best
     return found if real_poles(found.model) else _with_pole(found, pieces, floors)

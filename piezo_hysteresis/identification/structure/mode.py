@@ -27,7 +27,7 @@ from ..records.excitation_content import excitation_content
 from ..steps.linear_start import dynamics_of
 from .piece_fit import DELAY, PieceFit
 from .pieces import Kind, RecordPiece
-from .ringing import RESOLVED, SLOWEST, ringing_lines
+from .ringing import RESOLVED, SAME_LINE, SLOWEST, ringing_lines
 from .structure_fit import fit_structure, misfit_of
 
 RINGING_STAYS = 0.7
@@ -58,7 +58,9 @@ def with_mode(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[f
         mode = ExtraResonance(r=1.0, f0=frequency, zeta=DAMPING)
         rings = fit_structure(plain.model.with_effect(mode), pieces, floors)
         described = misfit_of(kind, rings, pieces) < RINGING_STAYS * misfit_of(kind, plain, pieces)
-        if described and rings.cost < found.cost and rings.model[ExtraResonance.name]["zeta"] <= RINGS:
+        fitted = rings.model[ExtraResonance.name]
+        stays = max(fitted["f0"] / frequency, frequency / fitted["f0"]) < SAME_LINE and fitted["zeta"] <= RINGS
+        if described and stays and rings.cost < found.cost:
             found = rings
     if found is plain or abs(found.model.values()[SHARE] - 1.0) > WHOLE:
         silent = min(_silent(plain, pieces, floors), key=lambda f: f.cost, default=plain)

@@ -34,6 +34,7 @@ from ..steps.remaining_lag import AMPLIFIERS, amplifier_of, lag_beside_mode
 from .mode import held_by, lag_of_mode, mode_notices
 from .piece_fit import PieceFit
 from .pieces import RecordPiece
+from .step_edge import step_edge_notices
 from .structure_fit import fit_structure
 
 OPEN = 1.2
@@ -83,8 +84,8 @@ class LinearPart:
         return found
 
     def notices(self, final: PieceFit) -> list[Notice]:
-        """``ringing``, ``amplifier`` and ``step_time``, with the numbers of the final fit."""
-        found = mode_notices(final)
+        """``ringing``, ``step_edge``, ``amplifier`` and ``step_time``, with the numbers of the final fit."""
+        found = mode_notices(final) + step_edge_notices(final)
         if pole := amplifier_of(final.model):
             said = f"a low-pass with time constant {pole['tau']:.4g} s acts before the hysteresis, as in an amplifier"
             behind = any(amplifier_of(m) is None for m in self.likely)

@@ -84,7 +84,7 @@ class StructureChoice:
         one, if there are structures without it. If the state of the operator was kept, all of them are structures with
         the operator.
     notices : tuple of Notice
-        ``structure``, ``memory``, ``ringing``, ``amplifier``, ``step_time``.
+        ``structure``, ``memory``, ``ringing``, ``step_edge``, ``amplifier``, ``step_time``.
     """
 
     fit: Fit
