@@ -36,7 +36,8 @@ LAGS = (0.3, 1.5, 4.0)
 LATE = 20
 """Delay of the response to a step that is a further start value [samples]."""
 DESCRIBED = 0.1
-"""Two more orders of the ARX dynamics are accepted if at most this share of the power after a step remains."""
+"""Two more orders of the ARX dynamics are accepted if at most this share of the power after a step, or of the whole
+cost, remains."""
 START_POLES = (0.3, 0.8)
 """Start values of a pole."""
 ADDED = 0.5
@@ -74,7 +75,7 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     best, lead = _with_poles_and_mode(plain, pieces, floors)
     if np.inf > _after_steps(best, pieces) > SETTLED:
         limited = with_slew_limit(best, pieces, floors)
-        if _after_steps(limited, pieces) < SECOND * _after_steps(best, pieces):
+        if limited.cost < best.cost and _after_steps(limited, pieces) < SECOND * _after_steps(best, pieces):
             best = limited
             if ExtraResonance.name not in best.model:
                 best = with_mode(limited, pieces, floors)
@@ -193,8 +194,8 @@ def _with_two_more_orders(
     if decay is None:
         return best
     found = fit_structure(_with_factor(before.model, decay), pieces, floors)
-    describes = _after_steps(found, pieces) < DESCRIBED * _after_steps(best, pieces)
-    return found if describes and found.cost < best.cost else best
+    shares = (_after_steps(found, pieces) / _after_steps(best, pieces), found.cost / best.cost)
+    return found if max(shares) < 1.0 and min(shares) < DESCRIBED else best
 
 
 def _with_second_mode(best: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
