@@ -34,6 +34,7 @@ from ..identification.records.excitation_check import missing_excitation
 from ..identification.records.noise_floor import ADEQUATE, floors, noise_floors, noise_of_averages
 from ..identification.records.sampling import shortened
 from ..identification.structure.left_out import has_several_drives, score_left_out
+from ..identification.structure.structure_choice import LEADS
 from ..model.model import Model
 from ..model.provenance import provenance
 from ..record import Notice, Record
@@ -113,12 +114,13 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     chosen = sorted(aside or fitted)
     final = _Delivered(start, found.fit if found else None)
     contenders = [] if found else [_Delivered(now.stated_model, now)]
-    if more.accepted:
+    enough = len(used) >= FEWEST_RECORDS and several
+    if more.accepted and (enough or not is_certain):  # an effect that would be named with others is certain, too
         last = more.accepted[-1].best
         contenders.append(_Delivered(last.fit.stated_model, last.fit))
     if contenders:
-        final = _best(final, contenders, records, least.tolist(), fitted, chosen)
-    if more.accepted and final is contenders[-1]:
+        final = _best(final, contenders, records, least.tolist(), fitted, chosen, LEADS if is_certain else EXTENDS)
+    if more.accepted and contenders and final is contenders[-1]:
         steps, score = [*steps, *more.steps], more.score
     else:
         steps = [*steps, *(replace(s, accepted=False) for s in more.steps)]
@@ -143,8 +145,9 @@ def _best(
     least: Sequence[float],
     fitted: Collection[int],
     tested: Sequence[int],
+    lead: float,
 ) -> _Delivered:
-    """The model that predicts rates, amplitudes and records left out best; the start stays if none is better.
+    """The model that predicts rates, amplitudes and records left out best, by `lead`; the start stays if none does.
 
     A model that diverges on a test record is not taken.
     """
@@ -153,7 +156,7 @@ def _best(
         with suppress(PiezoError):
             score = score_left_out(contender.model, records, least, fitted)
             contender.model.free_run([records[i] for i in with_conditioning(records, tested)])
-            if score < reached - EXTENDS:
+            if score < reached - lead:
                 best, reached = contender, score
     return best
 
