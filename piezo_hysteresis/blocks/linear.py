@@ -75,9 +75,11 @@ class LinearBlock(Block):
         m, y, rows = len(dx), np.empty((1, x.size)), np.empty((len(dx) + len(self.names), x.size))
         deviation = x - x0
         z_next = self.filter(deviation[None, :], z, y)
-        dz = self.filter(dx - dx0[:, None], dz, rows[:m])
+        dz = self.filter(dx - dx0[:, None] if dx0.any() else dx, dz, rows[:m])
         own = self.by_parameter(deviation, y[0], z[0], own, rows[m:])
-        rows += np.concatenate((self.gain * dx0, self.gain_slopes() * x0))[:, None]
+        settled = np.concatenate((self.gain * dx0, self.gain_slopes() * x0))
+        if settled.any():  # not where the drive began at 0 V, as most do
+            rows += settled[:, None]
         return self.gain * x0 + y[0], rows, (x0, z_next), (dx0, dz, own)
 
 

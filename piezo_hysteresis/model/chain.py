@@ -248,10 +248,10 @@ class Chain:
             x, dx, s, t = block.linearise(x, dx, s, t)
             if block.names:
                 kept = [k for k, n in enumerate(block.names) if n in wanted]
-                if kept == list(range(len(kept))):
-                    dx = dx[: before + len(kept)]
-                else:
-                    dx = np.vstack((dx[:before], dx[before:][kept]))
+                for j, k in enumerate(kept):
+                    if j < k:
+                        dx[before + j] = dx[before + k]
+                dx = dx[: before + len(kept)]
                 rows += [block.names[k] for k in kept]
             states.append(s)
             tangents.append(t)

@@ -190,13 +190,15 @@ def fit_pieces(
     def products(model: Model, names: Sequence[str]) -> tuple[Array, Array]:
         return linearised(model, pieces, floors, names, slow)
 
-    names, damping = tuple(names), FIRST_DAMPING
+    names, damping, is_doubtful = tuple(names), FIRST_DAMPING, False
     now = at_its_cost(model, names, *products(model, names))
     while now.iterations < max_iterations and now.cost > PERFECT:
-        better = None
+        better, refused = None, 0
         while better is None and damping < FARTHEST:
-            better = _step(now, products, damping)
+            better = _step(now, products, damping, is_doubtful or refused > 0)
             damping = max(damping * (10.0 if better is None else 0.1), 1e-9)
+            refused += better is None
+        is_doubtful = refused > 0
         if better is None:
             break
         gain = 1.0 - better.cost / now.cost
@@ -207,14 +209,17 @@ def fit_pieces(
     return PieceFit(now.model, names, now.matrices, now.weights, now.cost, converged, now.iterations)
 
 
-def _step(now: PieceFit, products: Products, damping: float) -> PieceFit | None:
+def _step(now: PieceFit, products: Products, damping: float, is_doubtful: bool) -> PieceFit | None:
+    """The fit after a damped step; None if its cost is not lower. If that is likely, because a step before was refused,
+    the cost is computed first without slopes, which take most of the time.
+    """
     total, names = now.total, now.names
     step = best_step(now, total, damping)
     values = now.model.values()
     moved = np.clip([values[n] for n in names] + step[: len(names)], *bounds_of(now.model, names))
     try:
         model = now.model.with_values(dict(zip(names, moved.tolist(), strict=True)))
-        if not _cost(model, names, products) < now.cost:  # without slopes, which take most of the time
+        if is_doubtful and not _cost(model, names, products) < now.cost:
             return None
         matrices, weights = products(model, names)
     except (DivergenceError, ParameterError):

@@ -97,44 +97,34 @@ def prior_of(model: Model, names: Sequence[str], slow: int) -> Array:
     slow : int
         Number of zeros and waves of all runs.
     """
-    numbers, runs = len(names), slow // (1 + WAVES)
+    numbers, runs, values = len(names), slow // (1 + WAVES), model.values()
+    place = {name: k for k, name in enumerate(names)}
+
+    def row(terms: Sequence[tuple[str, float]], sigma: float, usual: float = 0.0) -> Array:
+        """A sum of parameters that is `usual` within `sigma`, linearised at the model: (1, q + slow + 1)."""
+        found = np.zeros((1, numbers + slow + 1))
+        found[0, -1] = usual
+        for name, factor in terms:
+            found[0, place[name]] = factor
+            found[0, -1] -= factor * values[name]
+        return found / sigma
+
     waves = np.zeros((slow - runs, numbers + slow + 1))
     waves[:, numbers + runs : -1] = np.eye(slow - runs)
     rows = [waves]
     fast, late = (f"{CreepTwoRates.name}.{n}" for n in ("gamma_fast", "gamma_slow"))
-    if fast in names and late in names:
-        rows.append(_row(model, names, [(fast, 1.0), (late, -1.0)], ONE_RATE, slow))
-    creeps = [n for n in (fast, late, f"{Creep.name}.gamma") if n in names]
-    rows += [_row(model, names, [(n, 1.0)], CREEP_SPREAD, slow, CREEP) for n in creeps]
-    if MEMORY.name in model and f"{MEMORY.name}.c[0]" in names:
-        count = model[MEMORY.name].array("c").size
-        weights = [f"{MEMORY.name}.c[{j}]" for j in range(count)]
+    if fast in place and late in place:
+        rows.append(row([(fast, 1.0), (late, -1.0)], ONE_RATE))
+    rows += [row([(n, 1.0)], CREEP_SPREAD, CREEP) for n in (fast, late, f"{Creep.name}.gamma") if n in place]
+    if MEMORY.name in model and f"{MEMORY.name}.c[0]" in place:
+        weights = [f"{MEMORY.name}.c[{j}]" for j in range(model[MEMORY.name].array("c").size)]
         padded = [None, *weights, None]  # narrower and wider plays than these have no weight
         for around in zip(padded, weights, padded[2:], strict=False):
-            terms = [(n, f) for n, f in zip(around, (1.0, -2.0, 1.0), strict=True) if n is not None]
-            rows.append(_row(model, names, terms, SMOOTH * LOOP, slow))
+            rows.append(row([(n, f) for n, f in zip(around, (1.0, -2.0, 1.0), strict=True) if n], SMOOTH * LOOP))
     levels = [n for n in names if n.partition(".")[0] == MEMORY.level_term.name]
-    rows += [_row(model, names, [(n, 1.0)], LEVEL, slow) for n in levels]
+    rows += [row([(n, 1.0)], LEVEL) for n in levels]
     curves = {f"{EvenInputPolynomial.name}.{p.name}" for p in EvenInputPolynomial.parameters}
     curves.add(f"{model.hysteresis.name}.p1")
-    rows += [_row(model, names, [(n, 1.0)], CURVE, slow) for n in names if n in curves]
+    rows += [row([(n, 1.0)], CURVE) for n in names if n in curves]
     whole = np.vstack(rows)
     return np.asarray(whole.T @ whole / INDEPENDENT)
-
-
-def _row(
-    model: Model,
-    names: Sequence[str],
-    terms: Sequence[tuple[str, float]],
-    sigma: float,
-    slow: int,
-    usual: float = 0.0,
-) -> Array:
-    """A sum of parameters that is `usual` within `sigma`, linearised at the model: (1, q + slow + 1)."""
-    row = np.zeros((1, len(names) + slow + 1))
-    row[0, -1] = usual
-    values = model.values()
-    for name, factor in terms:
-        row[0, names.index(name)] = factor
-        row[0, -1] -= factor * values[name]
-    return row / sigma
