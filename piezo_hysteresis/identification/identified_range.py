@@ -25,14 +25,16 @@ from ..effects import UnnamedCorrection
 from ..model.model import Model
 from ..parameter import slew_text
 from ..record import Experiment, Notice, Record
-from .records.excitation_content import MOVES, excitation_content, moving
+from .records.excitation_content import MOVES, ExcitationContent, excitation_content, moving
 from .records.noise import voltage_noise
+from .records.steady_waves import slowest_wave
 from .steps.remaining_lag import error_of_lag
+from .structure.pieces import Kind, pieces_of
 
 LOWEST, HIGHEST = "voltage_min", "voltage_max"
 """Keys of the provenance: voltages [V]."""
 SLOWEST, FASTEST = "frequency_min", "frequency_max"
-"""Keys of the provenance: frequencies between which 90 % of the power of dv/dt lies [Hz]."""
+"""Keys of the provenance: slowest and fastest rate of the drive between its steps [Hz]."""
 STEEPEST = "slew_rate_max"
 """Key of the provenance: rate that is exceeded in 1 % of the moving samples [V/s]."""
 LAG_ERROR = "lag_uncertainty"
@@ -62,12 +64,12 @@ def identified_range(records: Sequence[Record], fitted: Collection[int]) -> Mapp
     """
     chosen = [records[i] for i in fitted]
     voltages = np.concatenate([np.append(r.voltage, r.settled_voltage) for r in chosen])
-    contents = moving([excitation_content(r) for r in chosen])
+    moved = moving([_motion(r) for r in chosen])
     found = {
         LOWEST: voltages.min(),
         HIGHEST: voltages.max(),
-        SLOWEST: min((c.slowest for c in contents if c.bandwidth > 0.0), default=0.0),
-        FASTEST: max((c.bandwidth for c in contents), default=0.0),
+        SLOWEST: min((m.slowest for m in moved if m.bandwidth > 0.0), default=0.0),
+        FASTEST: max((m.bandwidth for m in moved), default=0.0),
         STEEPEST: max(_slew_rate(r) for r in chosen),
     }
     return {key: repr(float(f"{number:.6g}")) for key, number in found.items()}
@@ -100,22 +102,39 @@ def _outside_of(model: Model, record: Record) -> Iterator[Notice]:
     low, high, slowest, fastest, steepest = (float(model.provenance[key]) for key in KEYS)
     room = BEYOND * (high - low)
     least, most = float(record.voltage.min()), float(record.voltage.max())
-    content = excitation_content(record)
+    motion = _motion(record)
     if least < low - room or most > high + room:
         known = f"the model was identified from {low:.3g} to {high:.3g} V"
         said = f"the drive goes from {least:.3g} to {most:.3g} V, {known}"
         yield Notice("outside_amplitudes", said, record.phase)
-    drive_moves = content.span >= MOVES * (high - low)
-    if drive_moves and content.bandwidth > FASTER * fastest > 0.0:
-        said = f"the drive reaches {content.bandwidth:.3g} Hz, the model was identified up to {fastest:.3g} Hz"
-        yield Notice("outside_frequencies", said + _lag_error(model, content.bandwidth), record.phase)
-    if drive_moves and SLOWER * content.slowest < slowest and content.bandwidth > 0.0:
-        said = f"the drive is as slow as {content.slowest:.3g} Hz, the model was identified from {slowest:.3g} Hz"
+    drive_moves = motion.span >= MOVES * (high - low)
+    if drive_moves and motion.bandwidth > FASTER * fastest > 0.0:
+        said = f"the drive reaches {motion.bandwidth:.3g} Hz, the model was identified up to {fastest:.3g} Hz"
+        yield Notice("outside_frequencies", said + _lag_error(model, motion.bandwidth), record.phase)
+    if drive_moves and SLOWER * motion.slowest < slowest and motion.bandwidth > 0.0:
+        said = f"the drive is as slow as {motion.slowest:.3g} Hz, the model was identified from {slowest:.3g} Hz"
         yield Notice("outside_frequencies", said, record.phase)
     rate = _slew_rate(record)
     if rate > FASTER * steepest > 0.0:
         said = f"the drive changes by {slew_text(rate, 4)}, the model was identified up to {slew_text(steepest, 4)}"
         yield Notice("outside_rates", said, record.phase)
+
+
+def _motion(record: Record) -> ExcitationContent:
+    """Content of the drive of a record between its steps and holds; of a drive that only steps, that of the steps.
+
+    A step has most of the power of dv/dt, at all frequencies, and would hide the rate of a sine after it. So would a
+    fast sine hide a slow one.
+    """
+    pieces = pieces_of((record,), (0,))
+    moves = np.repeat([p.kind is Kind.LOOP for p in pieces], [p.record.size for p in pieces])
+    voltage = np.cumsum(np.diff(record.voltage, prepend=record.voltage[0])[moves])
+    if not np.ptp(voltage) > 0.0:
+        return excitation_content(record)
+    content = excitation_content(Record(voltage, voltage, record.sample_period, continues=True))
+    if not content.waves:
+        return content
+    return replace(content, slowest=slowest_wave(voltage, record.sample_period, float(voltage_noise((record,))[0])))
 
 
 def _lag_error(model: Model, frequency: float) -> str:

@@ -19,7 +19,7 @@ import re
 import numpy as np
 import pytest
 
-from benchmarks.nanopositioner import Nanopositioner
+from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.identification.identified_range import identified_range, outside
 from piezo_hysteresis.identification.identify import identify
@@ -47,6 +47,19 @@ def test_only_a_drive_outside_the_range_is_reported():
     (slow,) = outside(model, Experiment((sine(2.5, 0.25),)))
     assert slow.kind == "outside_frequencies"
     assert slow.message == "the drive is as slow as 0.25 Hz, the model was identified from 1 Hz"
+
+
+def test_a_step_does_not_hide_the_rates_of_the_sines_after_it():
+    """It has most of the power of dv/dt; a model of 1 Hz was called known up to 870 Hz, and from 9 Hz on."""
+    period = 5e-4
+    drive = np.concatenate((np.zeros(100), *(growing_sine(f, period) for f in (1.0, 10.0, 60.0))))
+    origin = identified_range((Record(drive, drive, period),), (0,))
+    assert float(origin["frequency_min"]) == pytest.approx(1.0, rel=0.01)
+    assert float(origin["frequency_max"]) == pytest.approx(60.0, rel=0.25)
+    slow = growing_sine(1.0, period)
+    model = Model((BoucWen(),), period, provenance=identified_range((Record(slow, slow, period),), (0,)))
+    (fast,) = (n for n in outside(model, Experiment((sine(2.0, 60.0),))) if n.kind == "outside_frequencies")
+    assert "the drive reaches 60 Hz, the model was identified up to 1.25 Hz" in fast.message
 
 
 def test_a_rest_in_which_the_drive_hardly_moves_shows_no_frequency():

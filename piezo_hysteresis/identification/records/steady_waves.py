@@ -66,19 +66,34 @@ def is_row_of_waves(voltage: Samples, sample_period: float, bandwidth: float, no
     >>> is_row_of_waves(waves, 1e-3, 21.0), is_row_of_waves(np.sign(waves), 1e-3, 400.0)
     (True, False)
     """
+    swings = _swings(voltage, noise)
+    if swings.size < FEWEST:
+        return False
+    rates, covered, shortest, _ = _rows(swings)
+    slow_enough = 2.0 * shortest * sample_period * bandwidth <= HARMONICS
+    return bool(0 < rates <= MOST and covered >= COVERED * swings.size and shortest >= SHORTEST and slow_enough)
+
+
+def slowest_wave(voltage: Samples, sample_period: float, noise: float = 0.0) -> float:
+    """Rate of the slowest wave of such a drive [Hz]; arguments as above."""
+    *_, longest = _rows(_swings(voltage, noise))
+    return 0.5 / (longest * sample_period)
+
+
+def _swings(voltage: Samples, noise: float) -> NDArray[np.int64]:
+    """Samples of every swing from one turning point to the next."""
     turns = np.empty(voltage.size, np.int64)
     count = find_turns(voltage, max(SWING * float(np.ptp(voltage)), ABOVE * noise), False, turns)
-    if count <= FEWEST:
-        return False
-    rates, covered, shortest = _rows(np.diff(turns[:count]))
-    slow_enough = 2.0 * shortest * sample_period * bandwidth <= HARMONICS
-    return bool(0 < rates <= MOST and covered >= COVERED * (count - 1) and shortest >= SHORTEST and slow_enough)
+    return np.diff(turns[:count])
 
 
 @kernel
-def _rows(sizes: NDArray[np.int64]) -> tuple[int, int, int]:
-    """Number of rows of swings that take equally long, swings in them, and samples of the shortest such swing."""
-    rates, covered, shortest = 0, 0, 1 << 60
+def _rows(sizes: NDArray[np.int64]) -> tuple[int, int, int, int]:
+    """Rows of at least `FEWEST` swings that take equally long.
+
+    Returns their number, the number of swings in them, and the samples of the shortest and of the longest such swing.
+    """
+    rates, covered, shortest, longest = 0, 0, 1 << 60, 0
     first = 0
     for i in range(1, sizes.size + 1):
         if i < sizes.size and abs(sizes[i] - sizes[first]) <= ALIKE * sizes[first] + 1.5:
@@ -87,5 +102,6 @@ def _rows(sizes: NDArray[np.int64]) -> tuple[int, int, int]:
             rates += 1
             covered += i - first
             shortest = min(shortest, sizes[first])
+            longest = max(longest, sizes[first])
         first = i
-    return rates, covered, shortest
+    return rates, covered, shortest, longest

@@ -188,7 +188,8 @@ def _loops(record: Record, u: Samples, largest: float) -> list[tuple[int, int, i
     spans = np.abs(u[edges] - u[starts])
     rates = np.round(PER_DECADE * np.log10(0.5 / times)).astype(int)
     # a difference of one swing is not another rate
-    rates = np.array([int(np.median(rates[max(0, k - 1) : k + 2])) for k in range(rates.size)])
+    inner = np.median((rates[:-2], rates[1:-1], rates[2:]), axis=0)
+    rates = np.concatenate(([rates[:2].mean()], inner, [rates[-2:].mean()]))[: rates.size].astype(int)
     sizes = np.minimum((AMPLITUDES * spans / largest).astype(int), AMPLITUDES - 1)
     found: list[tuple[int, int, int]] = []
     for end, rate, size in zip((edges + 1).tolist(), rates.tolist(), sizes.tolist(), strict=True):
