@@ -36,7 +36,7 @@ from ..record import Notice, Record
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .many_records import diagnose_many
-from .same_stage import UNCHANGED, same_stage
+from .same_stage import UNCHANGED_STAGE, same_stage
 from .search.execution.cores import using_cores
 from .single_record import diagnose_few
 from .unnamed.correction import without_corrections
@@ -194,11 +194,11 @@ def _without_given_model(state: DiagnosisState, error: DivergenceError) -> Diagn
 
 
 def compared_with_given(found: Diagnosis) -> Diagnosis:
-    """Without a verdict, what is known of a given model is that nothing has changed since it was identified.
+    """Without a verdict, what is known of a given model is that no change is visible since it was identified.
 
     If the time limit ended the search, the answer says so instead, because a longer search may find a name.
     """
-    unchanged = any(n.kind == UNCHANGED for n in found.experiment.notices)
+    unchanged = any(n.kind == UNCHANGED_STAGE for n in found.experiment.notices)
     if unchanged and found.verdict is Verdict.UNKNOWN and found.conclusion is not Conclusion.TIME_LIMIT:
         return replace(found, conclusion=Conclusion.NOTHING_CHANGED)
     return found

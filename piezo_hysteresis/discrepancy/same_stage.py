@@ -22,7 +22,7 @@ import numpy as np
 
 from ..changes.change_sentence import sentence_of
 from ..changes.changed_model import changed_model
-from ..changes.parameter_changes import find_change, is_unchanged
+from ..changes.parameter_changes import UNCHANGED, error_ratio, find_change
 from ..errors import DivergenceError, ModelError, ParameterError
 from ..identification.records.comparable import comparable
 from ..identification.records.noise_floor import floors, noise_floors, stroke
@@ -36,8 +36,8 @@ from .verdict import Conclusion
 
 HASH = "data_hash"
 """Key of the provenance."""
-UNCHANGED = "unchanged"
-"""Kind of the notice that the given model is still as good as when it was identified."""
+UNCHANGED_STAGE = "unchanged"
+"""Kind of the notice that the given model is still as good as when it was identified, as far as its error shows."""
 
 
 def same_stage(
@@ -67,7 +67,8 @@ def same_stage(
     Returns
     -------
     Diagnosis, Notice or None
-        The finding that nothing has changed, if the error is the known one; None if no change explains the records.
+        The changed parameter. A notice that no change is visible, or that the error has grown although no changed
+        parameter explains it; None if the model does not state its error, or diverges.
     """
     records = experiment.records
     recorded = experiment if given is None else given
@@ -78,16 +79,19 @@ def same_stage(
     known = known_error(model, MOVING)
     limits = np.maximum(least, known).tolist()
     try:
-        if known and is_unchanged(model, records, used, limits):
+        ratio = error_ratio(model, records, used, limits)
+        if known and ratio <= UNCHANGED:
             return Notice(
-                UNCHANGED,
-                "nothing has changed since the model was identified: apart from its zero, gain and loop height, which "
-                f"differ from day to day, its error is within the known error of {1e9 * known:.3g} nm; what is missing "
-                "now was missing then",
+                UNCHANGED_STAGE,
+                "no change beyond the known error is visible since the model was identified: apart from its zero, gain "
+                f"and loop height, which differ from day to day, its error is within the known {1e9 * known:.3g} nm "
+                f"({100.0 * known / stroke(records):.3g} % of the range); a smaller change may be hidden in it",
             )
         change = find_change(model, records, used, limits, progress)
         if change is None:
-            return None
+            said = f"apart from its zero, gain and loop height, the given model has {ratio:.2g} times its known error"
+            cause = "something has changed, or these drives show an error that it always had"
+            return Notice("grown_error", f"{said}: {cause}") if known else None
         changed = changed_model(model, change, records)
         where = located(model, records, used, least.tolist(), offset=True)
         both, span = (model, changed), stroke(records)

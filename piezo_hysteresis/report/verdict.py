@@ -31,7 +31,7 @@ HEADLINES = {
     "missing_effect": "Missing effect: {names}",
     "changed_parameter": "A parameter of the model has changed: {names}",
     "nothing_missing": "Nothing is missing beyond the noise",
-    "nothing_changed": "Nothing has changed since the model was identified; what is missing now was missing then",
+    "nothing_changed": "No change beyond the known error of the model is visible since it was identified",
     "time_limit": "The time limit ended the search before a verdict",
     "insufficient_data": "The data do not allow a verdict",
     "unexplained_gap": "Something is missing, but these data do not determine what it is",

@@ -20,11 +20,14 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from ...changes.moved_group import is_as_good
 from ...errors import RecordError
 from ...identification.free_run_error import Errors, free_per_record
 from ...identification.identified_range import outside
 from ...identification.records.comparable import comparable
 from ...model import model_file
+from ...model.model import Model
+from ...model.provenance import LARGEST, known_error
 from ...record import CONDITIONING, Experiment
 from ...report.correlation import CAPTION, correlate
 from ...report.figures.comparison import ModelComparison, compare
@@ -79,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     left = _left(tests)
     if describes(now.percent) and not (left and is_at_floor(comparison, now)):
         left = f" {floor_sentence(comparison, now)}{left}"
-    verdict = f"{error_sentence(now.percent)}{left}{_caveats(experiment)}"
+    verdict = f"{error_sentence(now.percent)}{_grown(model, now)}{left}{_caveats(experiment)}"
     console().print(f"Verdict: {verdict}", style="bold")
     severe = any(notice.severe for notice in (*experiment.notices, *conditioned))
     return 0 if describes(now.percent) and not severe else 1
@@ -92,8 +95,20 @@ def _left(tests: list[dict[str, Any]]) -> str:
     if not dependent:
         return ""
     return (
-        f" A part of the residual depends on the drive in {dependent} of {len(decided)} phases, so that the model can "
-        "be improved; see piezo diagnose."
+        f" A part of the residual depends on the drive in {dependent} of the {len(decided)} phases that decide this, so "
+        "that the model can be improved; see piezo diagnose."
+    )
+
+
+def _grown(model: Model, now: Errors) -> str:
+    """That the error is larger than any that the model had when it was identified."""
+    known = 100.0 * known_error(model, LARGEST) / now.range
+    largest = max(row.percent for row in now.judged)
+    if not known or not describes(now.percent) or is_as_good(largest, known):
+        return ""
+    return (
+        f" In one phase it is {largest:.3g} %, {largest / known:.2g} times the largest that the model is known to have: "
+        "the stage has changed, or the drive shows what the model misses; see piezo diagnose --model."
     )
 
 
