@@ -25,6 +25,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ..identification.structure.pieces import WEIGHTS, pieces_of
+from ..identification.structure.step_weights import shares_of_steps
 from ..model.model import Model
 from ..record import Record
 from .change_kinds import KINDS
@@ -89,23 +90,15 @@ class ChangeSearch:
         self.predicted, self.loop_share = predictions(model, records)
         self.used = list(used)
         self.sides = ["gain"] + (["loop"] if "loop" in self.predicted[0].rows else [])
-        self.weights, self.labels = self._weights(records, floors)
+        pieces = [p for p in pieces_of(records, self.used) if p.origin in self.used]
+        self._kinds = [p.kind for p in pieces]
+        self._floors = np.concatenate([np.full(p.record.size, floors[p.origin]) for p in pieces])
+        self.labels = np.repeat(np.arange(len(pieces)), [p.record.size for p in pieces])
+        root = np.sqrt([WEIGHTS[p.kind] / p.record.size for p in pieces])[self.labels] / self._floors
+        self.weights = root / np.sqrt(np.sum((root * self._floors) ** 2))
         self.sizes = [records[i].size for i in self.used]
         self.origins = np.repeat(self.used, self.sizes)
         self.measured = np.concatenate([records[i].displacement for i in self.used])
-
-    def _weights(self, records: Sequence[Record], floors: Sequence[float]) -> tuple[Array, NDArray[np.int64]]:
-        """Square root of the weight of every used sample, and the number of its piece."""
-        roots, labels = [], []
-        pieces = pieces_of(records, self.used)
-        for number, piece in enumerate(p for p in pieces if p.origin in self.used):
-            size = piece.record.size
-            weight = WEIGHTS[piece.kind] / size / floors[piece.origin] ** 2
-            roots.append(np.full(size, np.sqrt(weight)))
-            labels.append(np.full(size, number))
-        root, label = np.concatenate(roots), np.concatenate(labels)
-        floor = np.concatenate([np.full(records[i].size, floors[i]) for i in self.used])
-        return root / np.sqrt(np.sum((root * floor) ** 2)), label
 
     def _columns(self, key: str, size: float, names: Sequence[str]) -> tuple[Array, Array]:
         """Changed prediction of all used samples (n,), and the columns `names` with the same change (q, n)."""
@@ -167,6 +160,14 @@ class ChangeSearch:
             other[names.index("loop")] = -self.loop_share * row[names.index("gain")]
             rows.append(other)
         return rows if key == "none" else [*rows, np.zeros(len(names))]
+
+    def discount_steps(self, account: Account) -> None:
+        """Give a step that the account describes worse than all other motion less weight."""
+        y, columns = self._columns(account.key, account.size, account.names)
+        left = self._weighted(self.measured - y - account.theta @ columns, self.weights)
+        cost, weight = (np.bincount(self.labels, s**2) for s in (left, self.weights * self._floors))
+        squares = cost / np.maximum(weight, np.finfo(np.float64).tiny)
+        self.weights = self.weights * np.sqrt(shares_of_steps(self._kinds, squares, weight))[self.labels]
 
     def session(self, account: Account) -> dict[str, float]:
         """Relative changes of gain and loop height in an account."""

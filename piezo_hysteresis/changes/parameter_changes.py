@@ -38,6 +38,8 @@ from .signatures import AVERAGE, SECOND_ORDER, SHAPES, shaped_model
 
 Array = NDArray[np.float64]
 
+UNCHANGED = ADEQUATE**0.5
+"""Largest ratio of the error to the known one for which nothing has changed visibly: the one criterion for it."""
 EXPLAINS = 0.7
 """Largest share of V that a change may leave, relative to V with fitted gain, loop height and zero."""
 NEARLY_ALL, NEARLY_ALL_OF_A_SHAPE = 0.08, 0.01
@@ -85,7 +87,7 @@ def find_change(
     """
     search = ChangeSearch(model, records, used, floors)
     day = search.account("none")
-    if _is_known(search, day, floors):
+    if _error_ratio(search, day, floors) <= UNCHANGED:
         return None
     keys = [k for k, kind in KINDS.items() if k in SHAPES or (kind.rows and kind.rows[0] in search.predicted[0].rows)]
     first = [k for k in (*search.sides, *keys) if k not in (*SECOND_ORDER, "low_pass_before")]
@@ -117,7 +119,7 @@ def find_change(
     jackknife, *beside = search.halves(best).tolist()
     half = float(np.hypot(np.hypot(jackknife, found[0].alike(day.cost)), _spread_of_forms(found)))
     size = found[0].size
-    if not _is_sure(size, half) or (best.key in DAY_TO_DAY and abs(size) < FARTHEST * DAY_TO_DAY[best.key]):
+    if not is_sure(size, half) or (best.key in DAY_TO_DAY and abs(size) < FARTHEST * DAY_TO_DAY[best.key]):
         return None
     same = RIVAL if best.left < LEAVES else FORMS
     near = [e.account.key for e in found[1:] if e.account.cost < same * max(1.0, best.cost)]
@@ -148,24 +150,24 @@ def _moved_too(
     for name, jackknife in halves.items():
         size = best.own[name]
         half = float(np.hypot(jackknife, UNCERTAIN * np.sqrt(max(1.0, best.cost)) / best.scale[best.names.index(name)]))
-        if name != best.key and _in_deviations(search, best, name) > FARTHEST and _is_sure(size, half):
+        if name != best.key and _in_deviations(search, best, name) > FARTHEST and is_sure(size, half):
             low, high = search.stated(name, size - half), search.stated(name, size + half)
             found[name] = search.stated(name, size), low, high
     return found
 
 
-def is_unchanged(model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]) -> bool:
-    """Whether the differences of a day leave no more than the known error; arguments as `find_change`."""
-    search = ChangeSearch(model, records, used, floors)
-    return _is_known(search, search.account("none"), floors)
+def error_ratio(model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]) -> float:
+    """RMS error of an unchanged model over the known one, without the differences of a day; arguments as `find_change`.
 
-
-def _is_known(search: ChangeSearch, day: Account, floors: Sequence[float]) -> bool:
-    """The one criterion for a stage that has not changed, in the measure of the error that a model states.
-
-    With the weights of the search, an unchanged stage may seem to have changed, and a small change may be hidden.
+    It is in the measure of the error that a model states. With the weights of the search, an unchanged stage may seem
+    to have changed, and a small change may be hidden.
     """
-    return search.of_equal_records(day, [floors[i] for i in search.used]) <= ADEQUATE
+    search = ChangeSearch(model, records, used, floors)
+    return _error_ratio(search, search.account("none"), floors)
+
+
+def _error_ratio(search: ChangeSearch, day: Account, floors: Sequence[float]) -> float:
+    return float(np.sqrt(search.of_equal_records(day, [floors[i] for i in search.used])))
 
 
 def _filters_of_second_order(search: ChangeSearch) -> list[Account]:
@@ -208,6 +210,6 @@ def _spread_of_forms(found: Sequence[Explanation]) -> float:
     return max((abs(lag / unit - best.size) for cost, lag in forms if cost < most), default=0.0)
 
 
-def _is_sure(size: float, half: float) -> bool:
+def is_sure(size: float, half: float) -> bool:
     """Whether a size differs from 0; `half` is half its 95 % interval."""
     return bool(np.isfinite(half) and abs(size) > SURE * half / 1.96)

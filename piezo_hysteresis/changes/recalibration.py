@@ -15,7 +15,9 @@
 """`recalibrate`: fits an old model of the same stage to new records, by gain, offset, loop height and lag only.
 
 Records of one stage differ by about 0.5 % from one day to another. A model of many records with these four new numbers
-predicts better than a new model of one new record.
+predicts better than a new model of one new record. A stage that has not changed keeps its numbers: the error that the
+model states counts as the floor, gain and loop height are expected to be nearly the old ones, and the lag changes only
+if the records show it for certain.
 
 New records seldom show what the stage did before them, and its hysteresis remembers that until the drive has been at
 both ends of its range. The samples up to there are neither fitted nor part of the errors.
@@ -23,7 +25,7 @@ both ends of its range. The samples up to there are neither fitted nor part of t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,14 +39,19 @@ from ..identification.records.excitation_check import check_motion, moves
 from ..identification.records.noise import without_voltage_noise
 from ..identification.records.noise_floor import floors, stroke
 from ..model.model import Model
-from ..model.provenance import LARGEST, known_error, provenance, record_errors
-from ..record import CONDITIONING, Experiment, Record
+from ..model.provenance import LARGEST, MOVING, known_error, provenance, record_errors
+from ..record import CONDITIONING, Experiment, Notice, Record
 from .change_kinds import ParameterChange
-from .change_search import ChangeSearch
+from .change_search import AROUND, Account, ChangeSearch
 from .changed_model import changed_model
+from .explanation import UNCERTAIN
 from .moved_group import is_as_good
+from .parameter_changes import SEEN, is_sure
 
 Array = NDArray[np.float64]
+
+LARGEST_FACTOR = 10.0
+"""Gain relative to that of the model, or its reciprocal, from which the records are not those of the same stage."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -58,7 +65,9 @@ class Recalibration:
     gain, loop_height : float
         Relative changes of the mean slope, and of the loop at the same slope [1]; 0 if the model has no loop.
     lag : float
-        Change of the lag [s].
+        Change of the lag [s]; 0 if the records do not show one for certain.
+    intervals_95 : mapping of str to (float, float)
+        95 % intervals of the three, by name; infinite if the records have too few parts.
     offset : float
         Reading at zero displacement [m].
     before, after : float
@@ -68,17 +77,21 @@ class Recalibration:
     known : float
         The same of the old model, as it states it, or the noise floor of the records if it is larger [% of range]; 0 if
         it states none. A mean over kinds of drive is no measure for new records of one kind.
+    notices : tuple of Notice
+        What was corrected in the records.
     """
 
     model: Model
     gain: float
     loop_height: float
     lag: float
+    intervals_95: Mapping[str, tuple[float, float]]
     offset: float
     before: float
     after: float
     largest: float
     known: float
+    notices: tuple[Notice, ...]
 
     @property
     def is_as_good(self) -> bool:
@@ -109,16 +122,18 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     ModelError
         If the records are faster than the model.
     """
-    records = _after_a_loop(without_voltage_noise(experiment)[0].records)
+    quiet, notices = without_voltage_noise(experiment)
+    records = _after_a_loop(quiet.records)
     used = [i for i, r in enumerate(records) if moves(r) and r.phase != CONDITIONING]
     used = [i for i in used if not records[i].truncated] or used
     check_motion("recalibrate", [records[i] for i in used])
     least = floors(records)
-    search = ChangeSearch(model, records, used, least.tolist())
-    best = search.shaped("delay", free=search.sides)
-    best = min((best, search.account("none", free=search.sides)), key=lambda account: account.cost)
+    limits = np.maximum(least, known_error(model, MOVING)).tolist()
+    search = ChangeSearch(model, records, used, limits)
+    search.discount_steps(search.shaped("delay"))
+    best, intervals = _fitted(search)
     session = search.session(best)
-    change = ParameterChange("delay", best.size, (best.size, best.size), (), best.cost, best.cost, session)
+    change = ParameterChange("delay", best.size, intervals["lag"], (), best.cost, best.cost, session)
 
     def zeroed(candidate: Model) -> Model:
         bare = candidate.without(Offset.name)
@@ -126,12 +141,15 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
         old = candidate[Offset.name] if Offset.name in candidate else Offset()
         return bare.with_effect(old.with_values(y0=float(np.mean([np.mean(left[i]) for i in used]))))
 
+    factor = 1.0 + session["gain"]
+    beyond = f"recalibrate: the gain would have to be {factor:.3g} times that of the model"
+    if not 1.0 / LARGEST_FACTOR < factor < LARGEST_FACTOR:
+        raise IdentificationError(f"{beyond}, expected at most {LARGEST_FACTOR:g} times; check stage, columns and units")
     try:
         fitted = zeroed(changed_model(model, change, records))
     except ParameterError as reason:
         raise IdentificationError(
-            f"recalibrate: the gain would have to be {1.0 + session.get('gain', 0.0):.3g} times that of the model, "
-            f"which is beyond its bounds ({reason}); check stage, columns and units"
+            f"{beyond}, with a parameter beyond its bounds ({reason}); check stage, columns and units"
         ) from None
 
     def by_record(candidate: Model) -> Array:
@@ -151,12 +169,37 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
         best.own["gain"] if kept else 0.0,
         search.stated("loop", best.own.get("loop", 0.0)) if kept else 0.0,
         best.size if kept else 0.0,
+        {n: ends if kept else (min(ends[0], 0.0), max(ends[1], 0.0)) for n, ends in intervals.items()},
         new[Offset.name]["y0"],
         100.0 * before / span,
         100.0 * rms / span,
         100.0 * float(by_new.max()) / span,
         100.0 * max(stated, float(np.sqrt(np.mean(least[used] ** 2)))) / span if stated else 0.0,
+        notices,
     )
+
+
+def _fitted(search: ChangeSearch) -> tuple[Account, dict[str, tuple[float, float]]]:
+    """The fit of gain, loop height and lag, and their 95 % intervals; without a lag that is not certain."""
+    still, late = search.account("delay"), search.shaped("delay")
+    half, *beside = search.halves(late).tolist()
+    half = float(np.hypot(half, UNCERTAIN * np.sqrt(max(1.0, late.cost) / _curvature_of_lag(search, late))))
+    sure = still.cost - late.cost > SEEN**2 and is_sure(late.size, half)
+    best = late if sure else still
+    intervals = {"lag": (late.size - half, late.size + half)}
+    for name, jackknife in zip(search.sides, beside, strict=True):
+        alike = UNCERTAIN * np.sqrt(max(1.0, best.cost)) / best.scale[best.names.index(name)]
+        side = float(np.hypot(jackknife, alike))
+        low, high = (search.stated(name, best.own[name] + s * side) for s in (-1.0, 1.0))
+        intervals["loop_height" if name == "loop" else name] = low, high
+    return best, intervals
+
+
+def _curvature_of_lag(search: ChangeSearch, late: Account) -> float:
+    """Half the second derivative of the cost by the lag [1/s²]."""
+    near = AROUND * min(p.record.sample_period for p in search.predicted)
+    rises = (search.account("delay", late.size + s * near).cost - late.cost for s in (-1.0, 1.0))
+    return max(0.5 * sum(rises) / near**2, float(np.finfo(np.float64).tiny))
 
 
 def _after_a_loop(records: Sequence[Record]) -> tuple[Record, ...]:

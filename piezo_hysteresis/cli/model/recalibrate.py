@@ -18,9 +18,10 @@ from __future__ import annotations
 
 import argparse
 
+import numpy as np
+
 from ...changes.moved_group import EXCESS, FULL
 from ...changes.recalibration import Recalibration, recalibrate
-from ...identification.records.noise import without_voltage_noise
 from ...model import model_file
 from ...report.json_file import write_json
 from ...report.words import describes, error_sentence
@@ -49,22 +50,28 @@ def run(args: argparse.Namespace) -> int:
     """
     require_new_results(args)
     model = model_file.load(args.model)
-    experiment, noise = without_voltage_noise(reading_options.read(args))
+    experiment = reading_options.read(args)
     found = recalibrate(model, experiment)
     path = model_file.save(found.model, args.output)
     if args.json is not None:
         numbers = ("gain", "loop_height", "lag", "offset", "before", "after", "largest", "known")
         units = ("relative", "relative", "s", "m", *4 * ("percent_of_range",))
         rows = {f"{n}_{u}": getattr(found, n) for n, u in zip(numbers, units, strict=True)}
-        write_json(args.json, {"schema": 1, "model": str(path), **rows})
+        intervals = {f"{n}_interval_95": ends for n, ends in found.intervals_95.items() if np.isfinite(ends).all()}
+        write_json(args.json, {"schema": 1, "model": str(path), **rows, **intervals})
     out = console()
     out.print("Changes of the model, and its new offset:")
-    out.print(f"gain         {100.0 * found.gain:+.3f} %")
-    out.print(f"loop height  {100.0 * found.loop_height:+.3f} %")
-    out.print(f"lag          {1e6 * found.lag:+.4g} µs")
+    for name, size, factor, unit in (
+        ("gain", found.gain, 100.0, "%"),
+        ("loop height", found.loop_height, 100.0, "%"),
+        ("lag", found.lag, 1e6, "µs"),
+    ):
+        ends = found.intervals_95.get(name.replace(" ", "_"))
+        told = f" (95 %: {factor * ends[0]:+.3g} to {factor * ends[1]:+.3g} {unit})" if ends else ""
+        out.print(f"{name:<12} {factor * size:+.3f} {unit}{told}")
     out.print(f"offset       {1e9 * found.offset:.4g} nm")
     out.print(f"The free-run error was {found.before:.3g} % of the range before and is {found.after:.3g} % after.")
-    show_notices((*experiment.notices, *noise))
+    show_notices((*experiment.notices, *found.notices))
     out.print(f"wrote {path}")
     severe = sum(notice.severe for notice in experiment.notices)
     caveat = f" Severe findings in the data make this doubtful: {severe}, see above." if severe else ""

@@ -29,30 +29,41 @@ from numpy.typing import NDArray
 from .piece_fit import DELAY, PieceFit
 from .pieces import Kind, RecordPiece
 
+Array = NDArray[np.float64]
+
 UNHEARD = 1e-3
 """Share of the usual weight of steps with which they only determine what no other motion shows."""
 ALIKE = 10.0
 """Ratio of the mean square misfit of a step to that of all other pieces from which the step has less weight."""
 
 
-def discounted_steps(pieces: Sequence[RecordPiece], fit: PieceFit) -> list[RecordPiece]:
-    """The pieces; a step with a larger misfit than the others has a share of its weight that is smaller by as much.
+def shares_of_steps(kinds: Sequence[Kind], squares: Array, weights: Array) -> Array:
+    """Share of its usual weight for every piece: less for a step with a larger misfit than the other pieces, else 1.
 
     This is the weight that makes the size of the misfit of a step one of the unknowns, as it does in C of the gap
     finder: half the logarithm of the mean square counts, and not the mean square.
 
     Parameters
     ----------
-    pieces : sequence of RecordPiece
-        Pieces in order.
-    fit : PieceFit
-        A fit to them.
+    kinds : sequence of Kind, length n
+        What the drive does in every piece.
+    squares : (n,) ndarray
+        Mean square misfit [floors²].
+    weights : (n,) ndarray
+        Weights of the pieces.
     """
+    steps = np.array([kind is Kind.STEP for kind in kinds])
+    usual = ALIKE * max(1.0, _mean(squares, np.where(steps, 0.0, weights)))
+    return np.where(steps, np.minimum(1.0, usual / np.maximum(squares, np.finfo(np.float64).tiny)), 1.0)
+
+
+def discounted_steps(pieces: Sequence[RecordPiece], fit: PieceFit) -> list[RecordPiece]:
+    """The pieces, where a step with a larger misfit in a fit than the others has a smaller share of its weight."""
     counted = [k for k, p in enumerate(pieces) if p.kind is not Kind.CONDITIONING]
-    found, usual = list(pieces), ALIKE * max(1.0, misfit_beside_steps(fit, pieces))
-    for k, square in zip(counted, fit.squares.tolist(), strict=True):
-        if pieces[k].kind is Kind.STEP:
-            found[k] = replace(pieces[k], share=min(1.0, usual / square) if square > 0.0 else 1.0)
+    shares = shares_of_steps([pieces[k].kind for k in counted], fit.squares, fit.weights)
+    found = list(pieces)
+    for k, share in zip(counted, shares.tolist(), strict=True):
+        found[k] = replace(pieces[k], share=share)
     return found
 
 
@@ -65,8 +76,12 @@ def without_steps(pieces: Sequence[RecordPiece]) -> list[RecordPiece]:
 
 def misfit_beside_steps(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
     """Mean square misfit of the pieces that are no steps, in floors; infinite if all are steps."""
-    weights = np.where(_are_steps(pieces), 0.0, fit.weights)
-    return float(weights @ fit.squares / weights.sum()) if weights.any() else np.inf
+    return _mean(fit.squares, np.where(_are_steps(pieces), 0.0, fit.weights))
+
+
+def _mean(squares: Array, weights: Array) -> float:
+    """Weighted mean; infinite without any weight."""
+    return float(weights @ squares / weights.sum()) if weights.any() else np.inf
 
 
 def lateness_of_steps(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
