@@ -144,7 +144,7 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     factor = 1.0 + session["gain"]
     beyond = f"recalibrate: the gain would have to be {factor:.3g} times that of the model"
     if not 1.0 / LARGEST_FACTOR < factor < LARGEST_FACTOR:
-        raise IdentificationError(f"{beyond}, expected at most {LARGEST_FACTOR:g} times; check stage, columns and units")
+        raise IdentificationError(f"{beyond}, expected at most {LARGEST_FACTOR:g}; check stage, columns and units")
     try:
         fitted = zeroed(changed_model(model, change, records))
     except ParameterError as reason:

@@ -144,7 +144,7 @@ def test_the_interval_of_a_lag_includes_the_form_of_a_held_drive_that_rings():
     assert lag_holds(identify(played(stage, (10.0,)), memory=True), stage)
 
 
-@pytest.mark.parametrize("seed", [21, 61])
+@pytest.mark.parametrize("seed", [pytest.param(21, marks=pytest.mark.soak), 61])
 def test_a_stage_with_loops_at_one_end_of_its_range_is_predicted(seed):
     """Relays with a density along the level: errors were 0.9 to 1.9 % on other amplitudes, up to 5.7 % on rates."""
     assert one_amplitude.errors_of(one_amplitude.stages(1, seed)).max() < 0.3

@@ -57,7 +57,7 @@ def test_a_mode_that_only_triangles_excite_is_fitted_and_named():
     assert np.std(error) < 3e-3 * np.ptp(other.displacement)
 
 
-@pytest.mark.parametrize("share", [0.06, 0.3])
+@pytest.mark.parametrize("share", [pytest.param(0.06, marks=pytest.mark.soak), 0.3])
 def test_two_modes_are_described_at_a_rate_left_out(share):
     """The stage rings at 400 and 650 Hz; without the second mode, the error is up to 0.8 % of the range."""
     stage = Nanopositioner(mode=400.0, zeta=0.02, second_share=share, second_mode=650.0)

@@ -33,7 +33,7 @@ def played(stage, *frequencies):
     return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives))
 
 
-@pytest.mark.parametrize("rise", [2.5, 6.0])
+@pytest.mark.parametrize("rise", [pytest.param(2.5, marks=pytest.mark.soak), 6.0])
 def test_a_step_behind_a_largest_current_is_predicted_at_a_rate_left_out(rise):
     """The error was 1.3 to 2.4 % of the range, most of it in the ringing after the step."""
     slope = 5.0 / (rise * PERIOD)

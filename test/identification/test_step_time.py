@@ -39,7 +39,7 @@ def played(stage: Nanopositioner, frequency: float) -> tuple[Record, Record]:
     return replace(step, phase="step"), replace(sine, phase=f"sine_{frequency:g}hz")
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.soak), 2])
 def test_a_step_at_another_time_than_its_sample_does_not_disturb_the_sines(seed):
     """The lag was a compromise between both, with errors of 0.5 % at 30 Hz."""
     rng = np.random.default_rng(seed)

@@ -203,7 +203,7 @@ def test_a_rest_is_no_loop_that_could_be_left_out():
     assert set(kinds[1:]) == {Kind.LOOP}
 
 
-@pytest.mark.parametrize(("frequency", "percent"), [(1040.0, 0.1), (1400.0, 0.2)])
+@pytest.mark.parametrize(("frequency", "percent"), [pytest.param(1040.0, 0.1, marks=pytest.mark.soak), (1400.0, 0.2)])
 def test_a_fast_mode_is_resolved_up_to_near_half_the_sampling_rate(frequency, percent):
     """Half the sampling rate is 1667 Hz: the nearer the mode, the less of its form is left in the samples."""
     fast = Nanopositioner(mode=frequency, delay=2e-4, pole=2e-4)

@@ -95,8 +95,8 @@ def _left(tests: list[dict[str, Any]]) -> str:
     if not dependent:
         return ""
     return (
-        f" A part of the residual depends on the drive in {dependent} of the {len(decided)} phases that decide this, so "
-        "that the model can be improved; see piezo diagnose."
+        f" A part of the residual depends on the drive in {dependent} of the {len(decided)} phases that decide this, "
+        "so that the model can be improved; see piezo diagnose."
     )
 
 
@@ -107,8 +107,8 @@ def _grown(model: Model, now: Errors) -> str:
     if not known or not describes(now.percent) or is_as_good(largest, known):
         return ""
     return (
-        f" In one phase it is {largest:.3g} %, {largest / known:.2g} times the largest that the model is known to have: "
-        "the stage has changed, or the drive shows what the model misses; see piezo diagnose --model."
+        f" In one phase it is {largest:.3g} %, {largest / known:.2g} times the largest that the model is known to "
+        "have: the stage has changed, or the drive shows what the model misses; see piezo diagnose --model."
     )
 
 
