@@ -15,7 +15,8 @@
 """Changes between two recordings of one stage: are they named with their size, and does an unchanged stage get no name?
 
 Every stage of `benchmarks.nanopositioner` is recorded and identified, then recorded on another day with one change, or
-without a change. Delays and time constants go from a tenth of a sample to tens of samples.
+without a change. Delays and time constants go from a tenth of a sample to tens of samples. The stages that did not
+change are also recalibrated from one sine, and judged by the others.
 
     python -m benchmarks.changes --stages 8
 """
@@ -31,6 +32,8 @@ import numpy as np
 from benchmarks.figures import Cell, Figures, alone
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.changes.parameter_changes import find_change
+from piezo_hysteresis.changes.recalibration import recalibrate
+from piezo_hysteresis.identification.free_run_error import errors, free_per_record
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.records.noise_floor import floors
 from piezo_hysteresis.model.model import Model
@@ -42,6 +45,8 @@ FREQUENCIES = (1.0, 10.0, 60.0)
 """Of the growing sines of every recording [Hz]."""
 LEAST = 0.95
 """Share of the changed stages whose family has to be right; of the unchanged ones none may get a name."""
+WORSE = 1.25
+"""Largest ratio of the errors of an unchanged stage at other rates, after and before a recalibration from one rate."""
 
 
 def played(stage: Nanopositioner, triangles: bool) -> Experiment:
@@ -107,6 +112,14 @@ def named(model: Model, stage: Nanopositioner, triangles: bool) -> tuple[str, fl
     return change.kind.family, size, (interval[0], interval[1])
 
 
+def recalibrated(model: Model, day: Experiment, index: int) -> tuple[float, float]:
+    """Lag that a recalibration from one record adds [s], and the ratio of the errors of the other records after it."""
+    other = Experiment(tuple(r for k, r in enumerate(day.records) if k != index))
+    found = recalibrate(model, Experiment((day.records[index],)))
+    after, before = (errors(m, other, free_per_record(m, offset=True)).percent for m in (found.model, model))
+    return found.lag, after / before
+
+
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Number of stages."""
     parser.add_argument("--stages", type=int, default=8)
@@ -118,12 +131,16 @@ def run(options: argparse.Namespace) -> list[Figures]:
     """One row per change, over all stages."""
     found: dict[str, list[tuple[bool, bool | None, float | None, str]]] = {}
     false = 0
+    days: dict[float, list[tuple[float, float]]] = {f: [] for f in FREQUENCIES}
     for seed in range(options.first, options.first + options.stages):
         rng = np.random.default_rng(seed)
         stage = Nanopositioner.random(rng, mode=float(rng.uniform(250.0, 800.0)))
         model = identify(played(stage, options.triangles), memory=True).model
         for _ in range(2):
-            false += named(model, stage.on_another_day(rng), options.triangles) is not None
+            day = stage.on_another_day(rng)
+            false += named(model, day, options.triangles) is not None
+            for index, frequency in enumerate(FREQUENCIES):
+                days[frequency].append(recalibrated(model, played(day, options.triangles), index))
         for what, family, size, changed in changes(stage.on_another_day(rng), stage):
             answer = named(model, changed, options.triangles)
             right = answer is not None and answer[0] == family
@@ -150,8 +167,20 @@ def run(options: argparse.Namespace) -> list[Figures]:
         failures.append(f"family right in {right} of {len(every)}, promised {LEAST:.0%}")
     if false:
         failures.append(f"{false} unchanged stages got a name, promised 0")
+    late = sum(lag != 0.0 for own in days.values() for lag, _ in own)
+    ratios = {f: [ratio for _, ratio in own] for f, own in days.items()}
+    if late or max(map(max, ratios.values())) > WORSE:
+        failures.append(f"recalibration changed {late} lags; errors up to {max(map(max, ratios.values())):.3g} times")
+    recalibrations: list[tuple[Cell, ...]] = [
+        (f"{f:g}", f"{sum(lag != 0.0 for lag, _ in days[f])} of {len(own)}", float(np.median(own)), max(own))
+        for f, own in ratios.items()
+    ]
     columns = ("change", "family right", "else", "error of the size, median [%]", "interval contains the size")
-    return [Figures("Changes between two recordings", columns, rows, tuple(failures))]
+    of_one = ("recalibrated from, Hz", "lag changed", "error at the other rates, after over before, median", "largest")
+    return [
+        Figures("Changes between two recordings", columns, rows, tuple(failures)),
+        Figures("Recalibration on another day, from one sine", of_one, recalibrations),
+    ]
 
 
 if __name__ == "__main__":
