@@ -50,10 +50,11 @@ SHAPES_OF_LOOPS = ("gain", "loop", Softening.name)
 SEEN = 0.7
 """Smallest size of a reported change, RMS in floors."""
 RIVAL = 1.15
-"""Largest ratio of V for which another change counts as explaining as much."""
+"""Ratio of V up to which another change always counts as explaining as much; beside a remaining V above it, that V is
+the ratio, because what remains is then an error of the form."""
 FORMS = 6.0
-"""Largest ratio of V for which the lag of another form counts in the interval. Up to it, another form is a rival if V
-remains above `LEAVES`: what remains is then an error of the form."""
+"""Largest ratio of V for which another change counts as explaining as much, and the lag of another form counts in the
+interval."""
 SURE = 2.5
 """Smallest significant change, in standard errors."""
 
@@ -121,7 +122,7 @@ def find_change(
     size = found[0].size
     if not is_sure(size, half) or (best.key in DAY_TO_DAY and abs(size) < FARTHEST * DAY_TO_DAY[best.key]):
         return None
-    same = RIVAL if best.left < LEAVES else FORMS
+    same = float(np.clip(best.left, RIVAL, FORMS))
     near = [e.account.key for e in found[1:] if e.account.cost < same * max(1.0, best.cost)]
     also = _moved_too(search, best, dict(zip(search.sides, beside, strict=True)))
     rivals = tuple(k for k in dict.fromkeys(near) if k != best.key and k not in also)

@@ -79,8 +79,8 @@ def same_stage(
     known = known_error(model, MOVING)
     limits = np.maximum(least, known).tolist()
     try:
-        ratio = error_ratio(model, records, used, limits)
-        if known and ratio <= UNCHANGED:
+        ratio = error_ratio(model, records, used, limits) if known else np.inf
+        if ratio <= UNCHANGED:
             return Notice(
                 UNCHANGED_STAGE,
                 "no change beyond the known error is visible since the model was identified: apart from its zero, gain "

@@ -115,7 +115,7 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     final = _Delivered(start, found.fit if found else None)
     contenders = [] if found else [_Delivered(now.stated_model, now)]
     enough = len(used) >= FEWEST_RECORDS and several
-    if more.accepted and (enough or not is_certain):  # an effect that would be named with others is certain, too
+    if more.accepted and (enough or not is_certain):  # few records do not show an effect beside a certain one
         last = more.accepted[-1].best
         contenders.append(_Delivered(last.fit.stated_model, last.fit))
     if contenders:

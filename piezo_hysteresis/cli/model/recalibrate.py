@@ -67,7 +67,11 @@ def run(args: argparse.Namespace) -> int:
         ("lag", found.lag, 1e6, "µs"),
     ):
         ends = found.intervals_95.get(name.replace(" ", "_"))
-        told = f" (95 %: {factor * ends[0]:+.3g} to {factor * ends[1]:+.3g} {unit})" if ends else ""
+        told = ""
+        if ends and np.isfinite(ends).all():
+            told = f" (95 %: {factor * ends[0]:+.3g} to {factor * ends[1]:+.3g} {unit})"
+        elif ends:
+            told = " (without an interval, because the records have too few parts)"
         out.print(f"{name:<12} {factor * size:+.3f} {unit}{told}")
     out.print(f"offset       {1e9 * found.offset:.4g} nm")
     out.print(f"The free-run error was {found.before:.3g} % of the range before and is {found.after:.3g} % after.")

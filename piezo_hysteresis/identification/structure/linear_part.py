@@ -27,7 +27,7 @@ from .piece_fit import DELAY, Array, PieceFit
 from .pieces import Kind, RecordPiece
 from .pole_place import LinearPart, in_every_place, real_poles, with_pole
 from .ringing import decay_after_steps, ringing_lines, sampled_decay
-from .step_edge import with_slew_limit
+from .step_edge import rise_of, with_slew_limit
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
 from .structure_fit import fit_structure, misfit_of
 
@@ -49,6 +49,8 @@ SLOW = 0.8
 SECOND = 0.5
 """Beside a ringing mode, dynamics of second order or a second mode are accepted if at most this share of the power
 after a step remains; without one, `DESCRIBED` counts. So is a largest slope of the drive."""
+RISES = 1.5
+"""Shortest rise of the largest step for which a largest slope is accepted; a shorter one is like a lag [samples]."""
 POLE_GAINS = 0.98
 """A pole is accepted if at most this share of the cost remains."""
 RESOLVES = 0.005
@@ -75,7 +77,8 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     best, lead = _with_poles_and_mode(plain, pieces, floors)
     if np.inf > _after_steps(best, pieces) > SETTLED:
         limited = with_slew_limit(best, pieces, floors)
-        if limited.cost < best.cost and _after_steps(limited, pieces) < SECOND * _after_steps(best, pieces):
+        gains = limited.cost < best.cost and _after_steps(limited, pieces) < SECOND * _after_steps(best, pieces)
+        if gains and rise_of(limited, pieces) > RISES:
             best = limited
             if ExtraResonance.name not in best.model:
                 best = with_mode(limited, pieces, floors)
@@ -206,7 +209,7 @@ def _with_second_mode(best: PieceFit, pieces: Sequence[RecordPiece], floors: Seq
     lines = [ExtraResonance(r=1.0, f0=f, zeta=DAMPING) for f, _ in ringing_lines(best.model, pieces)]
     models = [_with_factor(best.model, sampled_decay(line, best.model.sample_period)) for line in lines]
     tried = [fit_structure(m, pieces, floors, held_by(best)) for m in models]
-    found = min((f for f in tried if rings_as_a_whole(f.model)), key=lambda f: f.cost, default=best)
+    found = min(tried, key=lambda f: f.cost, default=best)
     if not _after_steps(found, pieces) < SECOND * _after_steps(best, pieces):
         return best
     return found if real_poles(found.model) else _with_pole(found, pieces, floors)
