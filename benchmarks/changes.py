@@ -45,7 +45,7 @@ FREQUENCIES = (1.0, 10.0, 60.0)
 """Of the growing sines of every recording [Hz]."""
 LEAST = 0.95
 """Share of the changed stages whose family has to be right; of the unchanged ones none may get a name."""
-WORSE = 1.25
+WORSE = 2.0
 """Largest ratio of the errors of an unchanged stage at other rates, after and before a recalibration from one rate."""
 
 

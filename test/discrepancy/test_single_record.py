@@ -47,7 +47,9 @@ def percents(model, experiment):
     return [row.percent for row in errors(model, experiment, Nuisance(offset=True)).rows]
 
 
-@pytest.mark.parametrize("frequencies", [(1.0, 60.0), pytest.param((1.0, 3.0, 20.0, 60.0, 60.0), marks=pytest.mark.soak)])
+@pytest.mark.parametrize(
+    "frequencies", [(1.0, 60.0), pytest.param((1.0, 3.0, 20.0, 60.0, 60.0), marks=pytest.mark.soak)]
+)
 def test_the_saved_model_predicts_a_rate_left_out_as_well_as_the_best_model(frequencies):
     recorded = played(STAGE, frequencies)
     unseen = played(STAGE, (10.0,))

@@ -27,7 +27,7 @@ from .piece_fit import DELAY, Array, PieceFit
 from .pieces import Kind, RecordPiece
 from .pole_place import LinearPart, in_every_place, real_poles, with_pole
 from .ringing import decay_after_steps, ringing_lines, sampled_decay
-from .step_edge import rise_of, with_slew_limit
+from .step_edge import with_slew_limit
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
 from .structure_fit import fit_structure, misfit_of
 
@@ -48,9 +48,8 @@ SLOW = 0.8
 """Largest real pole that is added; a slower one, which a zero nearly cancels, would take the place of creep."""
 SECOND = 0.5
 """Beside a ringing mode, dynamics of second order or a second mode are accepted if at most this share of the power
-after a step remains; without one, `DESCRIBED` counts. So is a largest slope of the drive."""
-RISES = 1.5
-"""Shortest rise of the largest step for which a largest slope is accepted; a shorter one is like a lag [samples]."""
+after a step remains; without one, `DESCRIBED` counts. So is a largest slope of the drive, and it must leave at most
+this share of the cost, too: a slope that the first samples just show takes the place of a lag."""
 POLE_GAINS = 0.98
 """A pole is accepted if at most this share of the cost remains."""
 RESOLVES = 0.005
@@ -77,8 +76,8 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     best, lead = _with_poles_and_mode(plain, pieces, floors)
     if np.inf > _after_steps(best, pieces) > SETTLED:
         limited = with_slew_limit(best, pieces, floors)
-        gains = limited.cost < best.cost and _after_steps(limited, pieces) < SECOND * _after_steps(best, pieces)
-        if gains and rise_of(limited, pieces) > RISES:
+        shares = (_after_steps(limited, pieces) / _after_steps(best, pieces), limited.cost / best.cost)
+        if max(shares) < SECOND:
             best = limited
             if ExtraResonance.name not in best.model:
                 best = with_mode(limited, pieces, floors)

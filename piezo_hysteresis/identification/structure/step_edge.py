@@ -35,22 +35,12 @@ RISE = 3.0
 
 def with_slew_limit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
     """The fit with a largest slope of the drive; `found` if no record begins with a step."""
-    height = _largest_step(pieces)
+    steps = [p.record for p in pieces if p.kind is Kind.STEP]
+    height = max((abs(float(r.voltage[-1]) - r.settled_voltage) for r in steps), default=0.0)
     if height == 0.0:
         return found
     limit = AmplifierSlewLimit(S=height / (RISE * found.model.sample_period))
     return fit_structure(found.model.with_effect(limit), pieces, floors, held_by(found))
-
-
-def rise_of(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
-    """Rise time of the largest step behind the largest slope of a fit [samples]."""
-    return _largest_step(pieces) / (fit.model[AmplifierSlewLimit.name]["S"] * fit.model.sample_period)
-
-
-def _largest_step(pieces: Sequence[RecordPiece]) -> float:
-    """Height of the largest step [V]; 0 without any."""
-    steps = [p.record for p in pieces if p.kind is Kind.STEP]
-    return max((abs(float(r.voltage[-1]) - r.settled_voltage) for r in steps), default=0.0)
 
 
 def step_edge_notices(fit: PieceFit) -> list[Notice]:
