@@ -165,7 +165,7 @@ class ChangeSearch:
         """Give a step that the account describes worse than all other motion less weight."""
         y, columns = self._columns(account.key, account.size, account.names)
         left = self._weighted(self.measured - y - account.theta @ columns, self.weights)
-        cost, weight = (np.bincount(self.labels, s**2) for s in (left, self.weights * self._floors))
+        cost, weight = (np.bincount(self.labels, s**2).astype(np.float64) for s in (left, self.weights * self._floors))
         squares = cost / np.maximum(weight, np.finfo(np.float64).tiny)
         self.weights = self.weights * np.sqrt(shares_of_steps(self._kinds, squares, weight))[self.labels]
 
