@@ -246,15 +246,17 @@ def test_a_good_model_is_not_changed(model):
     assert found.after <= found.before
 
 
-def test_a_stage_that_the_model_describes_less_well_keeps_its_lag_and_loop_on_another_day():
-    """A second mode that the model lacks is an error after steps; it was taken for a lag and a higher loop."""
+def test_a_stage_of_two_modes_keeps_its_lag_and_loop_on_another_day():
+    """Its ringing after the step was taken for a lag."""
     rng = np.random.default_rng(106)
     stage = Nanopositioner.random(rng, mode=float(rng.uniform(250.0, 800.0)), second_share=0.06)
     own = identify(played(stage, (1.0, 60.0)), memory=True).model
     found = recalibrate(own, played(stage.on_another_day(rng), (1.0,)))
-    low, high = found.intervals_95["lag"]
-    assert found.lag == 0.0 and low < 0.0 < high < 1e-4
-    assert abs(found.loop_height) < 0.01
+    assert found.lag == 0.0 and abs(found.loop_height) < 0.02
+    for name in ("lag", "loop_height"):
+        low, high = found.intervals_95[name]
+        assert low < 0.0 < high
+    assert found.intervals_95["lag"][1] < 1e-4
 
 
 @pytest.mark.parametrize("changed", [{"gain": 1.02}, {"filter_pole": 2e-3}])
