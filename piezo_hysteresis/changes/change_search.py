@@ -118,6 +118,11 @@ class ChangeSearch:
         zeros = np.add.reduceat(weight * signals, starts, axis=-1) / total
         return np.asarray(root * (signals - np.repeat(zeros, self.sizes, axis=-1)))
 
+    def _left(self, account: Account, root: Array) -> Array:
+        """Weighted residual that an account leaves (n,), with a zero fitted in every record."""
+        y, columns = self._columns(account.key, account.size, account.names)
+        return self._weighted(self.measured - y - account.theta @ columns, root)
+
     def account(
         self, key: str, size: float = 0.0, free: Sequence[str] = (), mask: NDArray[np.bool_] | None = None
     ) -> Account:
@@ -163,8 +168,7 @@ class ChangeSearch:
 
     def discount_steps(self, account: Account) -> None:
         """Give a step that the account describes worse than all other motion less weight."""
-        y, columns = self._columns(account.key, account.size, account.names)
-        left = self._weighted(self.measured - y - account.theta @ columns, self.weights)
+        left = self._left(account, self.weights)
         cost, weight = (np.bincount(self.labels, s**2).astype(np.float64) for s in (left, self.weights * self._floors))
         squares = cost / np.maximum(weight, np.finfo(np.float64).tiny)
         self.weights = self.weights * np.sqrt(shares_of_steps(self._kinds, squares, weight))[self.labels]
@@ -187,8 +191,7 @@ class ChangeSearch:
 
         A model states its error with these weights. Gain and loop height count as in the cost of the account.
         """
-        y, columns = self._columns(account.key, account.size, account.names)
-        left = self._weighted(self.measured - y - account.theta @ columns, np.ones(self.measured.size))
+        left = self._left(account, np.ones(self.measured.size))
         power = np.add.reduceat(left**2, np.cumsum([0, *self.sizes[:-1]])) / self.sizes
         moved = sum((account.own[n] / DAY_TO_DAY[n]) ** 2 for n in self.sides)
         return float(np.mean(power) / np.mean(np.square(floors)) + PENALTY * moved)

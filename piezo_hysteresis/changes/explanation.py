@@ -36,6 +36,12 @@ UNCERTAIN = 0.6
 """Share of the remaining error that can resemble a change. The remaining error counts at least as the floor."""
 
 
+def half_interval(account: Account, name: str, jackknife: float) -> float:
+    """Half 95 % interval of a linear change: that of the jackknife, and what the error that remains allows."""
+    alike = UNCERTAIN * np.sqrt(max(1.0, account.cost)) / account.scale[account.names.index(name)]
+    return float(np.hypot(jackknife, alike))
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Explanation:
     """An account, and the search with the model around which it is linearised."""

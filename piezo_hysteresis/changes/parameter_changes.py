@@ -33,7 +33,7 @@ from ..model.model import Model
 from ..record import Record
 from .change_kinds import KINDS, LEAVES, ParameterChange
 from .change_search import DAY_TO_DAY, FARTHEST, Account, ChangeSearch
-from .explanation import UNCERTAIN, Explanation, low_pass_before, moved_resonance
+from .explanation import Explanation, half_interval, low_pass_before, moved_resonance
 from .signatures import AVERAGE, SECOND_ORDER, SHAPES, shaped_model
 
 Array = NDArray[np.float64]
@@ -150,7 +150,7 @@ def _moved_too(
     found = {}
     for name, jackknife in halves.items():
         size = best.own[name]
-        half = float(np.hypot(jackknife, UNCERTAIN * np.sqrt(max(1.0, best.cost)) / best.scale[best.names.index(name)]))
+        half = half_interval(best, name, jackknife)
         if name != best.key and _in_deviations(search, best, name) > FARTHEST and is_sure(size, half):
             low, high = search.stated(name, size - half), search.stated(name, size + half)
             found[name] = search.stated(name, size), low, high

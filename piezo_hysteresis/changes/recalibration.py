@@ -44,7 +44,7 @@ from ..record import CONDITIONING, Experiment, Notice, Record
 from .change_kinds import ParameterChange
 from .change_search import AROUND, Account, ChangeSearch
 from .changed_model import changed_model
-from .explanation import UNCERTAIN
+from .explanation import UNCERTAIN, half_interval
 from .moved_group import is_as_good
 from .parameter_changes import SEEN, is_sure
 
@@ -188,8 +188,7 @@ def _fitted(search: ChangeSearch) -> tuple[Account, dict[str, tuple[float, float
     best = late if sure else still
     intervals = {"lag": (late.size - half, late.size + half)}
     for name, jackknife in zip(search.sides, beside, strict=True):
-        alike = UNCERTAIN * np.sqrt(max(1.0, best.cost)) / best.scale[best.names.index(name)]
-        side = float(np.hypot(jackknife, alike))
+        side = half_interval(best, name, jackknife)
         low, high = (search.stated(name, best.own[name] + s * side) for s in (-1.0, 1.0))
         intervals["loop_height" if name == "loop" else name] = low, high
     return best, intervals

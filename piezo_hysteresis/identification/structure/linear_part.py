@@ -76,8 +76,7 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     best, lead = _with_poles_and_mode(plain, pieces, floors)
     if np.inf > _after_steps(best, pieces) > SETTLED:
         limited = with_slew_limit(best, pieces, floors)
-        shares = (_after_steps(limited, pieces) / _after_steps(best, pieces), limited.cost / best.cost)
-        if max(shares) < SECOND:
+        if max(_shares_left(limited, best, pieces)) < SECOND:
             best = limited
             if ExtraResonance.name not in best.model:
                 best = with_mode(limited, pieces, floors)
@@ -196,7 +195,7 @@ def _with_two_more_orders(
     if decay is None:
         return best
     found = fit_structure(_with_factor(before.model, decay), pieces, floors)
-    shares = (_after_steps(found, pieces) / _after_steps(best, pieces), found.cost / best.cost)
+    shares = _shares_left(found, best, pieces)
     return found if max(shares) < 1.0 and min(shares) < DESCRIBED else best
 
 
@@ -212,6 +211,11 @@ def _with_second_mode(best: PieceFit, pieces: Sequence[RecordPiece], floors: Seq
     if not _after_steps(found, pieces) < SECOND * _after_steps(best, pieces):
         return best
     return found if real_poles(found.model) else _with_pole(found, pieces, floors)
+
+
+def _shares_left(found: PieceFit, before: PieceFit, pieces: Sequence[RecordPiece]) -> tuple[float, float]:
+    """Shares of the power after the steps, and of the cost, that a fit leaves."""
+    return _after_steps(found, pieces) / _after_steps(before, pieces), found.cost / before.cost
 
 
 def _after_steps(fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
