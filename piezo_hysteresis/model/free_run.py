@@ -95,20 +95,27 @@ def linearised_run(
     state: ChainState | None = None
     tangent: ChainTangent | None = None
     chain: Chain | None = None
-    for index, record in _in_one_go(records):
-        before, chain = chain, model.at(record.sample_period, chain.setting.sample_period if chain else None)
-        if state is None or tangent is None or not record.continues:
-            state = chain.rest(record.settled_voltage, record.start_time)
-            tangent = chain.rest_tangent(record.settled_voltage, wanted, record.start_time)
+    for stretch in _stretches(records):
+        first = stretch[0][1]
+        before, chain = chain, model.at(first.sample_period, chain.setting.sample_period if chain else None)
+        if state is None or tangent is None or not first.continues:
+            state = chain.rest(first.settled_voltage, first.start_time)
+            tangent = chain.rest_tangent(first.settled_voltage, wanted, first.start_time)
         elif before is not chain:
             tangent = chain.resume_tangent(state, tangent)
             state = chain.resume(state)
-        for start in range(0, record.size, block):
-            part = slice(start, min(start + block, record.size))
-            now, u = chain.channels_in(record.channels, part), record.voltage[part].copy()
+        for start in range(0, sum(r.size for _, r in stretch), block):
+            inside = list(_within(stretch, start, start + block))
+            u = np.concatenate([r.voltage[part] for _, r, part in inside])
+            used = chain.channels & first.channels.keys()
+            now = {name: np.concatenate([r.channels[name][part] for _, r, part in inside]) for name in used}
             y, names, slopes, state, tangent = chain.linearise(u, state, tangent, wanted, now)
-            if index is not None:
-                yield index, part, y, names, slopes
+            done = 0
+            for index, _, part in inside:
+                own = slice(done, done + part.stop - part.start)
+                done = own.stop
+                if index is not None:
+                    yield index, part, y[own], names, slopes[:, own]
 
 
 def standard_errors(model: Model, records: Iterable[Record]) -> list[Array]:
@@ -144,3 +151,32 @@ def _in_one_go(records: Iterable[Record]) -> Iterator[tuple[int | None, Record]]
                 yield None, Record(held, held, period, "hold", start_time=end, continues=True)
         yield index, record
         before = record
+
+
+_Stretch = list[tuple[int | None, Record]]
+"""Records that continue one another at one sample period, with their index, and without one the holds between them."""
+
+
+def _stretches(records: Iterable[Record]) -> Iterator[_Stretch]:
+    """Records in the longest stretches that can be simulated in one go."""
+    found: _Stretch = []
+    for index, record in _in_one_go(records):
+        if found:
+            last = found[-1][1]
+            alike = record.sample_period == last.sample_period and record.channels.keys() == last.channels.keys()
+            if not (record.continues and alike):
+                yield found
+                found = []
+        found.append((index, record))
+    if found:
+        yield found
+
+
+def _within(stretch: _Stretch, start: int, stop: int) -> Iterator[tuple[int | None, Record, slice]]:
+    """The parts of the records of a stretch that are from sample `start` up to `stop` of it."""
+    begin = 0
+    for index, record in stretch:
+        part = slice(max(start - begin, 0), min(stop - begin, record.size))
+        if part.start < part.stop:
+            yield index, record, part
+        begin += record.size

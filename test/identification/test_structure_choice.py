@@ -26,7 +26,7 @@ from piezo_hysteresis.identification.free_run_error import errors
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.steps.remaining_lag import lag
 from piezo_hysteresis.identification.structure.left_out import score_left_out
-from piezo_hysteresis.identification.structure.piece_fit import at_its_cost, best_step, fit_pieces, linearised
+from piezo_hysteresis.identification.structure.piece_fit import PieceFit, best_step, fit_pieces, linearised
 from piezo_hysteresis.identification.structure.pieces import Kind, pieces_of
 from piezo_hysteresis.identification.structure.prior import WANDER, WANDER_TIME
 from piezo_hysteresis.identification.structure.structure_fit import fit_structure
@@ -190,7 +190,7 @@ def test_the_wander_of_the_zero_is_fitted_for_strokes_of_any_length(identified, 
     model = replace(plain, displacement_scale=smaller * scale)
     floor = smaller * STAGE.noise * STAGE.stroke
     matrices, weights = linearised(model, pieces_of([record], (0,)), [floor], ())
-    fit = at_its_cost(model, (), matrices, weights)
+    fit = PieceFit(model, (), matrices, weights)
     span = WANDER * np.sqrt(2.0 * record.duration / WANDER_TIME) / (0.5 * np.pi)
     assert fit.slow[1] * span == pytest.approx(0.005, rel=0.02)
 

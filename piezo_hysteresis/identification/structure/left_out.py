@@ -21,7 +21,7 @@ from collections.abc import Collection, Sequence
 from ...effects import Arx
 from ...model.model import Model
 from ...record import Record
-from .piece_fit import at_its_cost, linearised
+from .piece_fit import PieceFit, linearised
 from .pieces import Kind, pieces_of
 from .scores import ModelStructure, judge
 from .structure_fit import free_numbers
@@ -54,7 +54,7 @@ def score_left_out(
     names = [n for n in free_numbers(model) if not _is_of_high_order(model, n)] if adjusts else []
     pieces = pieces_of(records, fitted)
     matrices, weights = linearised(model, pieces, floors, names)
-    return next(judge(at_its_cost(model, names, matrices, weights), pieces, (WHOLE,))).score
+    return next(judge(PieceFit(model, tuple(names), matrices, weights), pieces, (WHOLE,))).score
 
 
 def has_several_drives(records: Sequence[Record], fitted: Collection[int]) -> bool:

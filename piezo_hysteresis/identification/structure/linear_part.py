@@ -74,18 +74,17 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in lags]
     plain = min(found, key=lambda f: f.cost)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
-    if np.inf > _after_steps(best, pieces) > SETTLED:
-        limited = with_slew_limit(best, pieces, floors)
-        if max(_shares_left(limited, best, pieces)) < SECOND:
-            best = limited
-            if ExtraResonance.name not in best.model:
-                best = with_mode(limited, pieces, floors)
-                lead = _lead(limited, best)
-            best = best if real_poles(best.model) else _with_pole(best, pieces, floors)
+    limited = with_slew_limit(best, pieces, floors)
+    if np.inf > _after_steps(best, pieces) > SETTLED and max(_shares_left(limited, best, pieces)) < SECOND:
+        best = limited
+        if ExtraResonance.name not in best.model:
+            best = with_mode(limited, pieces, floors)
+            lead = _lead(limited, best)
+        best = best if real_poles(best.model) else _with_pole(best, pieces, floors)
     best = _with_second_mode(best, pieces, floors)
     best, *others = in_every_place(best, pieces, floors)
     if AmplifierSlewLimit.name not in best.model:
-        others.append(with_slew_limit(best, pieces, floors))  # it may be as likely as a pole or a delay
+        others.append(limited)  # it may be as likely as a pole or a delay
     fast = _with_two_more_orders(plain, best, pieces, floors)
     if fast is not best:
         return LinearPart(fast, 0.0)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +52,7 @@ CONVERGED = 1e-4
 """Relative decrease of the cost at which the fit ends."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class PieceFit:
     """A model fitted to pieces, and the inner products at the fitted parameters.
 
@@ -66,8 +67,6 @@ class PieceFit:
         the q parameters, the s zeros and waves of the runs, and the residual.
     weights : (p,) ndarray
         Weights of the pieces; their sum is 1.
-    cost : float
-        Weighted mean of R² with fitted zeros.
     converged : bool
         False if the limit of iterations was reached first.
     iterations : int
@@ -78,21 +77,25 @@ class PieceFit:
     names: tuple[str, ...]
     matrices: Array
     weights: Array
-    cost: float
-    converged: bool
-    iterations: int
+    converged: bool = False
+    iterations: int = 1
 
-    @property
+    @cached_property
+    def cost(self) -> float:
+        """Weighted mean of R² with fitted zeros and wander."""
+        return float(self.total[-1, -1] - self.total[len(self.names) : -1, -1] @ self.slow)
+
+    @cached_property
     def prior(self) -> Array:
         """The prior, in the form of the matrices."""
         return prior_of(self.model, self.names, self.matrices.shape[1] - 1 - len(self.names))
 
-    @property
+    @cached_property
     def total(self) -> Array:
         """Weighted sum of the matrices and the prior."""
         return np.asarray(np.tensordot(self.weights, self.matrices, 1) + self.prior)
 
-    @property
+    @cached_property
     def slow(self) -> Array:
         """Fitted zeros of the runs [m], then the amplitudes of the waves of their wander, shape (s,)."""
         total, numbers = self.total, len(self.names)
@@ -111,7 +114,7 @@ class PieceFit:
         """Fitted zeros of the runs [m], shape (r,)."""
         return self.slow[: self.runs]
 
-    @property
+    @cached_property
     def squares(self) -> Array:
         """R² of every piece, shape (p,)."""
         slow, own = self.slow, slice(len(self.names), -1)
@@ -156,13 +159,6 @@ def linearised(
     return matrices, weights / weights.sum()
 
 
-def at_its_cost(model: Model, names: Sequence[str], matrices: Array, weights: Array, iterations: int = 1) -> PieceFit:
-    """A fit in its present state; its cost is the weighted mean of R² with fitted zeros and wander."""
-    found = PieceFit(model, tuple(names), matrices, weights, np.inf, False, iterations)
-    total, numbers = found.total, len(found.names)
-    return replace(found, cost=float(total[-1, -1] - total[numbers:-1, -1] @ found.slow))
-
-
 def fit_pieces(
     model: Model,
     pieces: Sequence[RecordPiece],
@@ -191,7 +187,7 @@ def fit_pieces(
         return linearised(model, pieces, floors, names, slow)
 
     names, damping, is_doubtful = tuple(names), FIRST_DAMPING, False
-    now = at_its_cost(model, names, *products(model, names))
+    now = PieceFit(model, names, *products(model, names))
     while now.iterations < max_iterations and now.cost > PERFECT:
         better, refused = None, 0
         while better is None and damping < FARTHEST:
@@ -206,7 +202,7 @@ def fit_pieces(
         if gain < CONVERGED and damping <= 1.0:
             break
     converged = now.iterations < max_iterations
-    return PieceFit(now.model, names, now.matrices, now.weights, now.cost, converged, now.iterations)
+    return replace(now, converged=converged)
 
 
 def _step(now: PieceFit, products: Products, damping: float, is_doubtful: bool) -> PieceFit | None:
@@ -224,14 +220,14 @@ def _step(now: PieceFit, products: Products, damping: float, is_doubtful: bool) 
         matrices, weights = products(model, names)
     except (DivergenceError, ParameterError):
         return None
-    moved_there = at_its_cost(model, names, matrices, weights, now.iterations + 1)
+    moved_there = PieceFit(model, names, matrices, weights, iterations=now.iterations + 1)
     return moved_there if moved_there.cost < now.cost else None
 
 
 def _cost(model: Model, names: Sequence[str], products: Products) -> float:
     """Cost as in `PieceFit`, by a free run without slopes."""
     matrices, weights = products(model, ())
-    own = at_its_cost(model, (), matrices, weights)
+    own = PieceFit(model, (), matrices, weights)
     return own.cost + float(prior_of(model, names, matrices.shape[1] - 1)[-1, -1])
 
 

@@ -25,12 +25,12 @@ from collections.abc import Sequence
 from ...effects import AmplifierSlewLimit
 from ...record import Notice
 from .mode import held_by
-from .piece_fit import PieceFit
+from .piece_fit import PieceFit, linearised
 from .pieces import Kind, RecordPiece
 from .structure_fit import fit_structure
 
-RISE = 3.0
-"""Start value of the rise time of the largest step [samples]."""
+RISES = (1.1, 1.5, 2.0, 3.0, 4.0, 6.0)
+"""Start values of the rise time of the largest step [samples]; the fit begins with the most likely one."""
 
 
 def with_slew_limit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
@@ -39,8 +39,10 @@ def with_slew_limit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequ
     height = max((abs(float(r.voltage[-1]) - r.settled_voltage) for r in steps), default=0.0)
     if height == 0.0:
         return found
-    limit = AmplifierSlewLimit(S=height / (RISE * found.model.sample_period))
-    return fit_structure(found.model.with_effect(limit), pieces, floors, held_by(found))
+    limits = (AmplifierSlewLimit(S=height / (rise * found.model.sample_period)) for rise in RISES)
+    starts = (found.model.with_effect(limit) for limit in limits)
+    first = min((PieceFit(m, (), *linearised(m, pieces, floors, ())) for m in starts), key=lambda f: f.cost)
+    return fit_structure(first.model, pieces, floors, held_by(found))
 
 
 def step_edge_notices(fit: PieceFit) -> list[Notice]:
