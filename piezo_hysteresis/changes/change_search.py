@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -87,6 +88,7 @@ class ChangeSearch:
     """
 
     def __init__(self, model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]) -> None:
+        self._records = records
         self.predicted, self.loop_share = predictions(model, records)
         self.used = list(used)
         self.sides = ["gain"] + (["loop"] if "loop" in self.predicted[0].rows else [])
@@ -99,6 +101,12 @@ class ChangeSearch:
         self.sizes = [records[i].size for i in self.used]
         self.origins = np.repeat(self.used, self.sizes)
         self.measured = np.concatenate([records[i].displacement for i in self.used])
+
+    def around(self, model: Model) -> ChangeSearch:
+        """The same search, with the same weights, around another model."""
+        found = copy(self)
+        found.predicted, found.loop_share = predictions(model, self._records)
+        return found
 
     def _columns(self, key: str, size: float, names: Sequence[str]) -> tuple[Array, Array]:
         """Changed prediction of all used samples (n,), and the columns `names` with the same change (q, n)."""

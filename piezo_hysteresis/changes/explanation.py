@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,6 @@ import numpy as np
 from ..effects import AmplifierBandwidth, ExtraResonance
 from ..identification.steps.remaining_lag import amplifier_of
 from ..model.model import Model
-from ..record import Record
 from .change_search import Account, ChangeSearch
 from .signatures import shaped_model
 
@@ -61,29 +60,25 @@ class Explanation:
         return UNCERTAIN * abs(self.size) * float(np.sqrt(left / max(before - self.account.cost, 1e-12)))
 
 
-def moved_resonance(
-    model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]
-) -> Explanation:
+def moved_resonance(search: ChangeSearch, model: Model) -> Explanation:
     """The resonance at another frequency."""
     name = f"{ExtraResonance.name}.f0"
     before = model.values()[name]
 
     def about(moved: float) -> Explanation:
-        search = ChangeSearch(model.with_values({name: before + moved}), records, used, floors)
-        return Explanation(search, search.best("resonance"), moved)
+        near = search.around(model.with_values({name: before + moved}))
+        return Explanation(near, near.best("resonance"), moved)
 
     best = min((about((share - 1.0) * before) for share in MOVED), key=lambda e: e.account.cost)
     return _settled(about, best, (-0.5 * before, before))
 
 
-def low_pass_before(
-    model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float], lag: float
-) -> Explanation:
+def low_pass_before(search: ChangeSearch, model: Model, lag: float) -> Explanation:
     """A low-pass before the hysteresis; its time constant is about the lag of one behind it [s]."""
 
     def about(tau: float) -> Explanation:
-        search = ChangeSearch(shaped_model(model, "low_pass_before", tau), records, used, floors)
-        return Explanation(search, search.best("low_pass_before"), tau)
+        near = search.around(shaped_model(model, "low_pass_before", tau))
+        return Explanation(near, near.best("low_pass_before"), tau)
 
     present = amplifier_of(model)
     most = AmplifierBandwidth.parameters[0].upper - (present["tau"] if present else 0.0)

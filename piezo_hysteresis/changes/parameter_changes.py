@@ -100,12 +100,12 @@ def find_change(
     accounts += _filters_of_second_order(search)
     found = [Explanation(search, a) for a in accounts]
     if "resonance" in keys and min(e.account.cost for e in found) > LEAVES:
-        found.append(moved_resonance(model, records, used, floors))
+        found.append(moved_resonance(search, model))
     least = min(e.account.cost for e in found)
     lagging = next(e for e in found if e.account.key == "low_pass")
     if _may_be(lagging, least) and lagging.size > 0.0:
-        found.append(low_pass_before(model, records, used, floors, lagging.size))
-    found = [_simulated(e, model, records, used, floors) if _may_be(e, least) else e for e in found]
+        found.append(low_pass_before(search, model, lagging.size))
+    found = [_simulated(e, model) if _may_be(e, least) else e for e in found]
     # at similar cost, a delay or a filter of first order comes before one of second order
     found.sort(key=lambda e: e.account.cost * (RIVAL if e.account.key in SECOND_ORDER else 1.0))
     most = RIVAL * max(1.0, found[0].account.cost)
@@ -178,9 +178,7 @@ def _filters_of_second_order(search: ChangeSearch) -> list[Account]:
     return [best, *(search.best(key, near=best.size * zeta / other) for key, other in others)]
 
 
-def _simulated(
-    found: Explanation, model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]
-) -> Explanation:
+def _simulated(found: Explanation, model: Model) -> Explanation:
     """A delay or a filter, with the residual that remains when the model simulates it.
 
     An interpolated prediction leaves a larger residual if a stage rings within a few samples. Its size is more certain,
@@ -189,7 +187,7 @@ def _simulated(
     key, size = found.account.key, found.account.size
     if key not in SHAPES or size < 0.0:
         return found
-    search = ChangeSearch(shaped_model(model, key, size), records, used, floors)
+    search = found.search.around(shaped_model(model, key, size))
     exact = search.shaped(key, near=0.0) if key == "delay" else search.account(key)
     least = min(found.account, exact, key=lambda account: account.cost)
     return replace(found, account=replace(found.account, cost=least.cost, left=least.left))

@@ -28,6 +28,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, qr
 
+from ...blocks.kernel import kernel
 from ...errors import IdentificationError
 from ...record import Samples
 
@@ -103,10 +104,17 @@ def _lagged(x: Array, z: Array, rows: int, columns: int, first: int) -> Array:
     sums = np.empty((rows, columns))
     sums[0] = [x[first:] @ z[first - k : n - k] for k in range(columns)]
     sums[1:, 0] = [x[first - j : n - j] @ z[first:] for j in range(1, rows)]
-    for j in range(1, rows):
-        for k in range(1, columns):
-            sums[j, k] = sums[j - 1, k - 1] + x[first - j] * z[first - k] - x[n - j] * z[n - k]
+    _continue_diagonals(x, z, first, sums)
     return sums
+
+
+@kernel
+def _continue_diagonals(x: Array, z: Array, first: int, sums: Array) -> None:
+    """Every sum from the one of the lags before it; the first row and the first column are given."""
+    n = x.size
+    for j in range(1, sums.shape[0]):
+        for k in range(1, sums.shape[1]):
+            sums[j, k] = sums[j - 1, k - 1] + x[first - j] * z[first - k] - x[n - j] * z[n - k]
 
 
 def _factorised(signals: Signals, orders: tuple[int, int], delay: int) -> Array:
