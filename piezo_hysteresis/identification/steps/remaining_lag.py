@@ -17,10 +17,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from ...effects import AmplifierBandwidth, AmplifierBandwidthHeld, Arx, ExtraResonance
+from ...errors import ParameterError
 from ...model.model import Model
 from ...record import Notice
 from ..fit.fit import Fit
@@ -49,9 +51,19 @@ def lag(fit: Fit) -> tuple[float, float]:
         model = fit.model.with_values(values)
         return lag_beside_mode(model) + (lag_of_mode(model) if mode_is_inferred(model) else 0.0)
 
-    steps = {n: max(1e-6 * abs(fit.values[n]), 1e-12) for n in names}
     value = at({})
-    slopes = np.array([(at({n: fit.values[n] + h}) - value) / h for n, h in steps.items()])  # upward: d may be at 1
+
+    def slope(name: str) -> float:
+        """∂lag/∂θ; a delay may be at its lower bound, and a pole at the edge of stability, so it is one-sided."""
+        size = max(1e-6 * abs(fit.values[name]), 1e-12)
+        for step in (size, -size):
+            with suppress(ParameterError):
+                return (at({name: fit.values[name] + step}) - value) / step
+        return np.inf
+
+    slopes = np.array([slope(n) for n in names])
+    if not np.isfinite(slopes).all():
+        return value, np.inf
     rows = [fit.names.index(n) for n in names]
     variance = float(slopes @ fit.covariance[np.ix_(rows, rows)] @ slopes) if names else 0.0
     return value, float(np.sqrt(max(variance, 0.0)))
