@@ -34,13 +34,13 @@ class HeldBlock(Block):
 
     @abstractmethod
     def follow_tangent(self, x: Array, dx: Array, state: State, tangent: State, y: Array, dy: Array) -> None:
-        """`follow`, with rows dx (m, n) to dy (m + 1, n); `tangent` (m + 1,) is updated."""
+        """`follow`, with rows dx (m, n) to dy (m + p, n) for p parameters; `tangent` (m + 1,) is updated."""
 
     def static(self, x0: float) -> float:
         return x0
 
     def static_slopes(self, x0: float) -> tuple[float, Array]:
-        return 1.0, np.zeros(1)
+        return 1.0, np.zeros(len(self.names))
 
     def rest(self, x0: float, time: float) -> State:
         return np.array([x0])
@@ -55,6 +55,6 @@ class HeldBlock(Block):
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()
-        rows = np.empty((len(dx) + 1, x.size))
+        rows = np.empty((len(dx) + len(self.names), x.size))
         self.follow_tangent(x, np.ascontiguousarray(dx), state, tangent, y, rows)
         return y, rows, state, tangent

@@ -30,7 +30,7 @@ from ..c_form import CForm
 from ..effects import ChainPosition, Effect, Invertibility
 from ..errors import ModelError
 from ..inverse_terms import InverseTerms
-from ..model.chain import Chain, ChainState
+from ..model.chain import ChainState
 from ..model.model import Model
 from ..model.samples import samples
 from .band import Band
@@ -120,8 +120,7 @@ class Inverse:
                 "leaves it out and predicts the resulting error"
             )
         self.model, self.limits, self.left_out = model, limits or Limits(), tuple(impossible)
-        self.sample_period = model.sample_period
-        self.chain: Chain = model.at(model.sample_period)
+        self.sample_period, self.chain = model.sample_period, model.at(model.sample_period)
         kept = Model(
             tuple(e for e in model.effects if e.invertibility is not Invertibility.IMPOSSIBLE and not _is_idle(e)),
             model.sample_period,
@@ -144,7 +143,9 @@ class Inverse:
         previews = [stage.preview for _, stage in inverted]
         self._ahead = [sum(previews[k + 1 :]) for k in range(len(previews))]
         self.preview = sum(previews)
-        self.is_exact = not impossible and all(stage.is_exact for _, stage in inverted)
+        on_drive = [e for e in model.effects if e.place is ChainPosition.DRIVE and not e.is_off]
+        exact = all(e.invertibility is Invertibility.EXACT for e in on_drive)
+        self.is_exact = exact and not impossible and all(stage.is_exact for _, stage in inverted)
         self.noise_gain = float(np.prod([stage.noise_gain for _, stage in inverted]))
 
     @property

@@ -25,6 +25,7 @@ from .drive.amplifier_bandwidth import AmplifierBandwidth
 from .drive.amplifier_bandwidth_held import AmplifierBandwidthHeld
 from .drive.amplifier_saturation import AmplifierSaturation
 from .drive.amplifier_slew_limit import AmplifierSlewLimit
+from .drive.amplifier_slew_limit_held import AmplifierSlewLimitHeld
 from .drive.backlash import Backlash
 from .dynamics.arx import Arx
 from .dynamics.extra_delay import ExtraDelay
@@ -66,6 +67,7 @@ from .unnamed.unnamed_relaxation import UnnamedRelaxation
 CHAIN: tuple[type[Effect], ...] = (
     AmplifierSaturation,
     AmplifierSlewLimit,
+    AmplifierSlewLimitHeld,
     AmplifierBandwidth,
     AmplifierBandwidthHeld,
     Backlash,
@@ -111,7 +113,12 @@ OPERATORS: dict[str, type[HysteresisOperator]] = {e.name: e for e in CHAIN if is
 BASELINE: tuple[type[Effect], ...] = (*OPERATORS.values(), Arx, Offset)
 """The published model, to which the other effects are added."""
 
-FINER_FORMS: tuple[type[Effect], ...] = (LevelDependentMemory, CreepTwoRates, SecondOrderLowPass)
+FINER_FORMS: tuple[type[Effect], ...] = (
+    AmplifierSlewLimitHeld,
+    LevelDependentMemory,
+    CreepTwoRates,
+    SecondOrderLowPass,
+)
 """Forms of effects with more parameters, for identified models. The gap finder names the effect and not the form."""
 
 UNNAMED: tuple[type[UnnamedCorrection], ...] = (UnnamedPositionMap, UnnamedPlays, UnnamedRelaxation)
@@ -151,6 +158,7 @@ __all__ = [
     "AmplifierBandwidthHeld",
     "AmplifierSaturation",
     "AmplifierSlewLimit",
+    "AmplifierSlewLimitHeld",
     "Arx",
     "AsymmetricHysteresis",
     "AxisCoupling",

@@ -25,6 +25,7 @@ from piezo_hysteresis.effects import (
     AmplifierBandwidthHeld,
     AmplifierSaturation,
     AmplifierSlewLimit,
+    AmplifierSlewLimitHeld,
     Discretisation,
     Effect,
 )
@@ -53,6 +54,26 @@ def test_no_step_is_larger_than_the_limit_and_a_drive_inside_it_passes(x: list[f
     assert np.abs(np.diff(y)).max() <= slope * PERIOD * (1 + 1e-9) + 1e-14
     if np.abs(np.diff(drive)).max() <= slope * PERIOD:
         np.testing.assert_array_equal(y, drive)
+
+
+def test_a_held_slope_limit_gives_the_mean_of_the_ramps_in_every_period() -> None:
+    finer, slope = 1000, 1e4
+    drive = 3.0 + np.cumsum(np.random.default_rng(5).normal(0.0, 0.1, 400))
+    drive[200:] += 2.0
+    block = AmplifierSlewLimit(S=slope).block(Discretisation(PERIOD / finer, PERIOD / finer))
+    ramps = block.run(np.repeat(drive, finer), block.rest(drive[0], 0.0))[0]
+    means = ramps.reshape(-1, finer).mean(axis=1)
+    assert np.abs(means - drive).max() > 1.0
+    np.testing.assert_allclose(run(AmplifierSlewLimitHeld(S=slope), drive), means, atol=slope * PERIOD / finer)
+
+
+@pytest.mark.parametrize("ratio", [1, 3, 40])
+def test_behind_a_held_slope_limit_the_lag_is_proportional_to_the_speed(ratio: int) -> None:
+    """In slow records, too: half the time that the amplifier needs for the step within one period of the model."""
+    speed, slope, t = -300.0, 2e3, np.arange(100) * PERIOD * ratio
+    block = AmplifierSlewLimitHeld(S=slope).block(Discretisation(PERIOD * ratio, PERIOD))
+    y = block.run(speed * t, block.rest(0.0, 0.0))[0]
+    np.testing.assert_allclose(y[1:], speed * (t[1:] - 0.5 * abs(speed) * PERIOD / slope), rtol=1e-6)
 
 
 def test_saturation_clips_hard_without_corner() -> None:

@@ -42,10 +42,10 @@ def test_a_step_behind_a_largest_current_is_predicted_at_a_rate_left_out(rise):
     free = free_per_record(found.model, offset=True)
     assert errors(found.model, played(stage, 10.0), free).percent < 0.25
     assert lag_holds(found, stage, PERIOD)
-    assert found.model["amplifier_slew_limit"]["S"] == pytest.approx(slope, rel=0.3)
+    assert found.model["amplifier_slew_limit_held"]["S"] == pytest.approx(slope, rel=0.3)
     assert "step_edge" in {notice.kind for notice in found.notices}
 
 
 def test_a_step_that_jumps_needs_no_such_limit():
     found = identify(played(STAGE, 1.0, 60.0), memory=True)
-    assert "amplifier_slew_limit" not in found.model
+    assert "amplifier_slew_limit_held" not in found.model

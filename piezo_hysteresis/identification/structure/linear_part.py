@@ -20,7 +20,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...effects import AmplifierSlewLimit, Arx, ExtraResonance
+from ...effects import AmplifierSlewLimitHeld, Arx, ExtraResonance
 from ...model.model import Model
 from .mode import DAMPING, SHAPE, SHARE, held_by, mode_is_inferred, rings_as_a_whole, with_mode
 from .piece_fit import DELAY, Array, PieceFit
@@ -83,7 +83,7 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
         best = best if real_poles(best.model) else _with_pole(best, pieces, floors)
     best = _with_second_mode(best, pieces, floors)
     best, *others = in_every_place(best, pieces, floors)
-    if AmplifierSlewLimit.name not in best.model:
+    if AmplifierSlewLimitHeld.name not in best.model:
         others.append(limited)  # it may be as likely as a pole or a delay
     fast = _with_two_more_orders(plain, best, pieces, floors)
     if fast is not best:

@@ -14,7 +14,7 @@
 
 """How a step rises: an amplifier with a largest current needs several samples for it, and so does a drive that ramps.
 
-Small motion is not late behind such an amplifier, and a stage that rings is excited less. Without it, the lag of small
+Slow motion is hardly late behind such an amplifier, and a stage that rings is excited less. Without it, the lag of slow
 motion and that of the steps contradict each other, and the ringing has the wrong amplitude and phase.
 """
 
@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...effects import AmplifierSlewLimit
+from ...effects import AmplifierSlewLimitHeld
 from ...record import Notice
 from .mode import held_by
 from .piece_fit import PieceFit, linearised
@@ -39,7 +39,7 @@ def with_slew_limit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequ
     height = max((abs(float(r.voltage[-1]) - r.settled_voltage) for r in steps), default=0.0)
     if height == 0.0:
         return found
-    limits = (AmplifierSlewLimit(S=height / (rise * found.model.sample_period)) for rise in RISES)
+    limits = (AmplifierSlewLimitHeld(S=height / (rise * found.model.sample_period)) for rise in RISES)
     starts = (found.model.with_effect(limit) for limit in limits)
     first = min((PieceFit(m, (), *linearised(m, pieces, floors, ())) for m in starts), key=lambda f: f.cost)
     return fit_structure(first.model, pieces, floors, held_by(found))
@@ -47,8 +47,8 @@ def with_slew_limit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequ
 
 def step_edge_notices(fit: PieceFit) -> list[Notice]:
     """``step_edge`` with the largest slope, if the model has one."""
-    if AmplifierSlewLimit.name not in fit.model:
+    if AmplifierSlewLimitHeld.name not in fit.model:
         return []
-    slope = fit.model[AmplifierSlewLimit.name]["S"]
+    slope = fit.model[AmplifierSlewLimitHeld.name]["S"]
     said = f"the steps rise as behind an amplifier with a largest slope of {slope:.3g} V/s"
-    return [Notice("step_edge", f"{said}; slower motion is not late by it")]
+    return [Notice("step_edge", f"{said}; slower motion is late in proportion to its speed")]
