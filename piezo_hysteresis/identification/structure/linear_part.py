@@ -29,7 +29,7 @@ from .pole_place import LinearPart, in_every_place, real_poles, with_pole
 from .ringing import decay_after_steps, ringing_lines, sampled_decay
 from .step_edge import with_slew_limit
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
-from .structure_fit import fit_structure, misfit_of
+from .structure_fit import SETTLED, fit_structure, is_settled, misfit_of
 
 LAGS = (0.3, 1.5, 4.0)
 """Start values of the delay [samples]."""
@@ -42,8 +42,6 @@ START_POLES = (0.3, 0.8)
 """Start values of a pole."""
 ADDED = 0.5
 """Start value of a second pole, and of the zero that cancels it."""
-SETTLED = 4.0
-"""Mean square misfit after a step [floors²] up to which nothing else is tried."""
 SLOW = 0.8
 """Largest real pole that is added; a slower one, which a zero nearly cancels, would take the place of creep."""
 SECOND = 0.5
@@ -74,13 +72,12 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in lags]
     plain = min(found, key=lambda f: f.cost)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
-    limited = with_slew_limit(best, pieces, floors)
-    if np.inf > _after_steps(best, pieces) > SETTLED and max(_shares_left(limited, best, pieces)) < SECOND:
-        best = limited
-        if ExtraResonance.name not in best.model:
-            best = with_mode(limited, pieces, floors)
-            lead = _lead(limited, best)
-        best = best if real_poles(best.model) else _with_pole(best, pieces, floors)
+    if is_settled(best, pieces):
+        limited = with_slew_limit(best, pieces, floors)
+    else:
+        limited, its_lead = _behind_slew_limit(plain, best, lead, pieces, floors)
+        if max(_shares_left(limited, best, pieces)) < SECOND:
+            best, lead = limited, its_lead
     best = _with_second_mode(best, pieces, floors)
     best, *others = in_every_place(best, pieces, floors)
     if AmplifierSlewLimitHeld.name not in best.model:
@@ -119,19 +116,19 @@ def _with_poles_and_mode(
     describes the steps.
     """
 
-    def is_settled(fit: PieceFit) -> bool:
-        return rings_as_a_whole(fit.model) and not _after_steps(fit, pieces) > SETTLED
+    def is_described(fit: PieceFit) -> bool:
+        return rings_as_a_whole(fit.model) and _after_steps(fit, pieces) <= SETTLED
 
     ringing = with_mode(plain, pieces, floors)
     best, without = _with_pole(ringing, pieces, floors), plain
-    if is_settled(best):
+    if is_described(best):
         return best, _lead(plain, best)
     lagging = best if ringing is plain else _with_pole(plain, pieces, floors)
     if lagging is not plain and not rings_as_a_whole(best.model):
         behind = with_mode(lagging, pieces, floors)
         if set(SHAPE) <= set(behind.names) and behind.cost < best.cost:
             best, without = behind, lagging
-    if not is_settled(best) and np.isfinite(_after_steps(best, pieces)):
+    if not is_described(best) and np.isfinite(_after_steps(best, pieces)):
         begun = [f for f in dict.fromkeys((best, lagging)) if f.model[Arx.name].array("a").size]
         tried = [_with_second_order(f, pieces, floors) for f in begun]
         tried = [f if ExtraResonance.name in f.model else with_mode(f, pieces, floors) for f in tried]
@@ -142,6 +139,21 @@ def _with_poles_and_mode(
         if _after_steps(second, pieces) < share * _after_steps(best, pieces):
             best, without = second, lagging
     return best, _lead(without, best)
+
+
+def _behind_slew_limit(
+    plain: PieceFit, best: PieceFit, lead: float, pieces: Sequence[RecordPiece], floors: Sequence[float]
+) -> tuple[PieceFit, float]:
+    """The fit with a largest slope of the drive, and the lead of a ringing mode.
+
+    Poles and mode that describe a slow edge hide the slope, so it is also fitted before them. From one slow rate, it is
+    found after them.
+    """
+    early = _with_poles_and_mode(with_slew_limit(plain, pieces, floors), pieces, floors)
+    late = with_slew_limit(best, pieces, floors)
+    ringing = late if ExtraResonance.name in late.model else with_mode(late, pieces, floors)
+    whole = ringing if real_poles(ringing.model) else _with_pole(ringing, pieces, floors)
+    return min(early, (whole, lead if ringing is late else _lead(late, ringing)), key=lambda found: found[0].cost)
 
 
 def _with_pole(start: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
@@ -201,7 +213,7 @@ def _with_two_more_orders(
 def _with_second_mode(best: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
     """The fit with ARX of two more orders for a second mode beside the first, if the residual rings; else `best`."""
     rings = ExtraResonance.name in best.model and not mode_is_inferred(best.model)
-    if not (rings and np.inf > _after_steps(best, pieces) > SETTLED):
+    if not rings or is_settled(best, pieces):
         return best
     lines = [ExtraResonance(r=1.0, f0=f, zeta=DAMPING) for f, _ in ringing_lines(best.model, pieces)]
     models = [_with_factor(best.model, sampled_decay(line, best.model.sample_period)) for line in lines]

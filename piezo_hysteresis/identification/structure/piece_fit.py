@@ -48,6 +48,8 @@ POLE, GAIN, DELAY = (f"{Arx.name}.{n}" for n in ("a[0]", "b[0]", "delay"))
 """Parameters of a lag."""
 PERFECT = 1e-9
 """Cost at which the fit ends, because the model reproduces the data exactly."""
+MOST = 25
+"""Largest number of linearisations of a fit."""
 CONVERGED = 1e-4
 """Relative decrease of the cost at which the fit ends."""
 
@@ -164,7 +166,7 @@ def fit_pieces(
     pieces: Sequence[RecordPiece],
     floors: Sequence[float],
     names: Sequence[str],
-    max_iterations: int = 25,
+    max_iterations: int = MOST,
 ) -> PieceFit:
     """Fit the parameters `names` by damped Gauss-Newton steps inside their bounds.
 

@@ -27,10 +27,12 @@ from ...record import Notice
 from .mode import held_by
 from .piece_fit import PieceFit, linearised
 from .pieces import Kind, RecordPiece
-from .structure_fit import fit_structure
+from .structure_fit import fit_structure, is_settled
 
 RISES = (1.1, 1.5, 2.0, 3.0, 4.0, 6.0)
-"""Start values of the rise time of the largest step [samples]; the fit begins with the most likely one."""
+"""Start values of the rise time of the largest step [samples]."""
+FEW = 4
+"""Number of linearisations after which the most likely start is known, if the steps are not described otherwise."""
 
 
 def with_slew_limit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
@@ -40,9 +42,12 @@ def with_slew_limit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequ
     if height == 0.0:
         return found
     limits = (AmplifierSlewLimitHeld(S=height / (rise * found.model.sample_period)) for rise in RISES)
-    starts = (found.model.with_effect(limit) for limit in limits)
-    first = min((PieceFit(m, (), *linearised(m, pieces, floors, ())) for m in starts), key=lambda f: f.cost)
-    return fit_structure(first.model, pieces, floors, held_by(found))
+    models, held = [found.model.with_effect(limit) for limit in limits], held_by(found)
+    if is_settled(found, pieces):
+        starts = [PieceFit(m, (), *linearised(m, pieces, floors, ())) for m in models]
+    else:
+        starts = [fit_structure(m, pieces, floors, held, FEW) for m in models]
+    return fit_structure(min(starts, key=lambda f: f.cost).model, pieces, floors, held)
 
 
 def step_edge_notices(fit: PieceFit) -> list[Notice]:

@@ -22,8 +22,11 @@ import numpy as np
 
 from ...effects import Arx
 from ...model.model import Model
-from .piece_fit import GAIN, PieceFit, fit_pieces
+from .piece_fit import GAIN, MOST, PieceFit, fit_pieces
 from .pieces import Kind, RecordPiece
+
+SETTLED = 4.0
+"""Mean square misfit after a step [floors²] up to which nothing else is tried."""
 
 
 def free_numbers(model: Model) -> list[str]:
@@ -36,10 +39,14 @@ def free_numbers(model: Model) -> list[str]:
 
 
 def fit_structure(
-    model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float], held: Collection[str] = ()
+    model: Model,
+    pieces: Sequence[RecordPiece],
+    floors: Sequence[float],
+    held: Collection[str] = (),
+    max_iterations: int = MOST,
 ) -> PieceFit:
     """Fit all free parameters of a model except those in `held`."""
-    return fit_pieces(model, pieces, floors, [n for n in free_numbers(model) if n not in held])
+    return fit_pieces(model, pieces, floors, [n for n in free_numbers(model) if n not in held], max_iterations)
 
 
 def misfit_of(kind: Kind, fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
@@ -47,3 +54,8 @@ def misfit_of(kind: Kind, fit: PieceFit, pieces: Sequence[RecordPiece]) -> float
     counted = [p for p in pieces if p.kind is not Kind.CONDITIONING]
     found = [s for s, p in zip(fit.squares.tolist(), counted, strict=True) if p.kind is kind]
     return float(np.mean(found)) if found else np.inf
+
+
+def is_settled(fit: PieceFit, pieces: Sequence[RecordPiece]) -> bool:
+    """Whether nothing else is tried for the steps: a fit describes them, or there is none."""
+    return not np.inf > misfit_of(Kind.STEP, fit, pieces) > SETTLED
