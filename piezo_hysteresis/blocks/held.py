@@ -34,7 +34,10 @@ class HeldBlock(Block):
 
     @abstractmethod
     def follow_tangent(self, x: Array, dx: Array, state: State, tangent: State, y: Array, dy: Array) -> None:
-        """`follow`, with rows dx (m, n) to dy (m + p, n) for p parameters; `tangent` (m + 1,) is updated."""
+        """`follow`, with rows dx (m, n) to dy (m + p, n) for p parameters; `tangent` (m + 1,) is updated.
+
+        Only the first parameter has a memory.
+        """
 
     def static(self, x0: float) -> float:
         return x0

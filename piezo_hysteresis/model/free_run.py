@@ -46,7 +46,7 @@ def free_run(model: Model, records: Iterable[Record]) -> list[Array]:
     outputs: list[Array] = []
     state: ChainState | None = None
     chain: Chain | None = None
-    for index, record in _in_one_go(records):
+    for index, record in _with_holds(records):
         before, chain = chain, model.at(record.sample_period, chain.setting.sample_period if chain else None)
         if state is None or not record.continues:
             state = chain.rest(record.settled_voltage, record.start_time)
@@ -136,7 +136,7 @@ def standard_errors(model: Model, records: Iterable[Record]) -> list[Array]:
     return found
 
 
-def _in_one_go(records: Iterable[Record]) -> Iterator[tuple[int | None, Record]]:
+def _with_holds(records: Iterable[Record]) -> Iterator[tuple[int | None, Record]]:
     """Records with their index, and without an index the holds between them, during which the stage moves on."""
     before: Record | None = None
     for index, record in enumerate(records):
@@ -154,13 +154,13 @@ def _in_one_go(records: Iterable[Record]) -> Iterator[tuple[int | None, Record]]
 
 
 _Stretch = list[tuple[int | None, Record]]
-"""Records that continue one another at one sample period, with their index, and without one the holds between them."""
+"""Records that continue one another at one sample period, each with its index; the holds between them have None."""
 
 
 def _stretches(records: Iterable[Record]) -> Iterator[_Stretch]:
     """Records in the longest stretches that can be simulated in one go."""
     found: _Stretch = []
-    for index, record in _in_one_go(records):
+    for index, record in _with_holds(records):
         if found:
             last = found[-1][1]
             alike = record.sample_period == last.sample_period and record.channels.keys() == last.channels.keys()

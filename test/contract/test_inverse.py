@@ -60,8 +60,11 @@ TYPICAL: dict[str, dict[str, float]] = {
     "arx": {},
 }
 
-APPROXIMATED = {"extra_delay": ("tau", (1e-5, 3e-5, 1e-3)), "amplifier_slew_limit_held": ("S", (3e5, 1e6))}
-"""Sizes at which the inverse with an error is a good one."""
+APPROXIMATED = {
+    "extra_delay": ("tau", (1e-5, 3e-5, 1e-3), 1e-4),
+    "amplifier_slew_limit_held": ("S", (1e4, 3e4, 1e5), 3e-3),
+}
+"""Sizes of effects that are inverted with an error, and its largest share of the range."""
 
 every_effect = pytest.mark.parametrize("kind", CHAIN, ids=lambda kind: kind.name)
 
@@ -167,10 +170,10 @@ def test_exact_at_the_corners_of_the_bounds(kind: type[Effect]) -> None:
 
 @pytest.mark.parametrize("kind", kinds(Invertibility.APPROXIMATE), ids=lambda kind: kind.name)
 def test_approximate_is_good_in_the_band(kind: type[Effect]) -> None:
-    name, sizes = APPROXIMATED[kind.name]
+    name, sizes, allowed = APPROXIMATED[kind.name]
     for size in sizes:
         inverse = Inverse(model_with(kind(**{name: size})))
-        assert mismatch(inverse.model, inverse) < 1e-4
+        assert mismatch(inverse.model, inverse) < allowed
 
 
 @pytest.mark.parametrize("kind", kinds(Invertibility.NOT_NEEDED), ids=lambda kind: kind.name)
@@ -320,5 +323,5 @@ def test_the_lag_behind_a_largest_slope_is_left_out_and_told() -> None:
     model = model_with(AmplifierSlewLimitHeld(S=1e4))
     inverse = Inverse(model)
     assert not inverse.is_exact
-    assert 1e-3 < mismatch(model, inverse) < 1e-2
+    assert mismatch(model, inverse) > 1e-3
     assert Inverse(model_with(AmplifierSlewLimitHeld())).is_exact

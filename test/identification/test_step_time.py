@@ -31,9 +31,10 @@ HOLD = 1.0
 
 
 def played(stage: Nanopositioner, frequency: float, first: int) -> tuple[Record, Record]:
-    """A step, then sines, from a generator that does not hold its output; the first sample is `first` after the step.
+    """A step, then sines, from a generator that does not hold its output.
 
-    The sines come half a sample earlier than if their output were held, and the step `first` / `FINER` samples earlier.
+    The first sample is `first` fine samples after the step. The sines come half a sample earlier than if their output
+    were held, and the step `first` / `FINER` samples earlier.
     """
     drive = growing_sine(frequency, PERIOD / FINER, (0.3, 0.6, 1.0), hold=HOLD)
     fine = stage.play(drive, PERIOD / FINER)

@@ -43,8 +43,8 @@ class AmplifierSlewLimitHeld(Effect):
     -----
     After every change of the converter by Δ, the amplifier needs the time |Δ|/S. Dynamics that are slower than the
     sample period see the mean over the period (ℓ = 0.5), faster ones the value at its end, which `AmplifierSlewLimit`
-    gives (ℓ = 0). Motion that is slower than the limit is late by it, too. In slow records, ℓ is in sample periods of
-    the model.
+    gives (ℓ = 0). Motion that is slower than the limit is late by a time proportional to its speed. In slow records, ℓ
+    is in sample periods of the model.
     """
 
     name = "amplifier_slew_limit_held"
@@ -53,7 +53,7 @@ class AmplifierSlewLimitHeld(Effect):
     family = "amplifier"
     place = ChainPosition.DRIVE
     equation = "y_i = v_i − ℓ Δ_i |Δ_i|/(S T), Δ_i = v_i − v_(i−1), |Δ_i| ≤ S T"
-    signature = "As for amplifier_slew_limit; slower motion is late in proportion to its speed"
+    signature = "As for amplifier_slew_limit; slower motion is late by a time proportional to its speed"
     source = "mean of a ramp of slope S that ends at the held value: ℓ = 0.5"
     parameters = (
         *AmplifierSlewLimit.parameters,
@@ -90,9 +90,8 @@ def linearise_ramps(x, dx, reach, late, growth, rise, share, state, tangent, y, 
     for i in range(x.size):
         end = min(max(x[i], before - reach), before + reach)
         move = end - before
-        lag = move * abs(move)
         back = 2.0 * late * abs(move) / reach
-        y[i] = end - late * lag / reach
+        y[i] = end - late * move * abs(move) / reach
         for j in range(m + 1):
             old = tangent[j]
             if end == x[i]:
@@ -100,8 +99,8 @@ def linearise_ramps(x, dx, reach, late, growth, rise, share, state, tangent, y, 
             elif j == m:
                 tangent[j] += growth if move > 0.0 else -growth
             dy[j, i] = tangent[j] - back * (tangent[j] - old)
-        dy[m, i] += late * lag * rise
-        dy[m + 1, i] = -share * lag / reach
+        dy[m, i] += late * move * abs(move) * rise
+        dy[m + 1, i] = -share * move * abs(move) / reach
         before = end
     state[0] = before
 

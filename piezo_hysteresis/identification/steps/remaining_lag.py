@@ -54,7 +54,10 @@ def lag(fit: Fit) -> tuple[float, float]:
     value = at({})
 
     def slope(name: str) -> float:
-        """∂lag/∂θ; a delay may be at its lower bound, and a pole at the edge of stability, so it is one-sided."""
+        """∂lag/∂θ; a delay may be at its lower bound, and a pole at the edge of stability, so it is one-sided.
+
+        Infinite if it is unknown.
+        """
         size = max(1e-6 * abs(fit.values[name]), 1e-12)
         for step in (size, -size):
             with suppress(ParameterError):

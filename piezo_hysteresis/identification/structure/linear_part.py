@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The linear part of a model without broadband records: a delay, a lightly damped mode, a low-pass, more orders."""
+"""The linear part of a model without broadband records: a delay, a mode, a low-pass, a largest slope, more orders."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ CONTRADICTED = 0.5
 
 
 def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> LinearPart:
-    """Fit a delay, and if they help: a mode, a pole or dynamics of second order, two more orders or a second mode.
+    """Fit a delay, and if they help: a mode, a pole or dynamics of second order, a largest slope, more orders.
 
     Parameters
     ----------
@@ -72,16 +72,14 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in lags]
     plain = min(found, key=lambda f: f.cost)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
-    if is_settled(best, pieces):
-        limited = with_slew_limit(best, pieces, floors)
-    else:
+    if not is_settled(best, pieces):
         limited, its_lead = _behind_slew_limit(plain, best, lead, pieces, floors)
         if max(_shares_left(limited, best, pieces)) < SECOND:
             best, lead = limited, its_lead
     best = _with_second_mode(best, pieces, floors)
     best, *others = in_every_place(best, pieces, floors)
     if AmplifierSlewLimitHeld.name not in best.model:
-        others.append(limited)  # it may be as likely as a pole or a delay
+        others.append(with_slew_limit(best, pieces, floors))  # it may be as likely as a pole or a delay
     fast = _with_two_more_orders(plain, best, pieces, floors)
     if fast is not best:
         return LinearPart(fast, 0.0)
@@ -146,8 +144,8 @@ def _behind_slew_limit(
 ) -> tuple[PieceFit, float]:
     """The fit with a largest slope of the drive, and the lead of a ringing mode.
 
-    Poles and mode that describe a slow edge hide the slope, so it is also fitted before them. From one slow rate, it is
-    found after them.
+    Poles and mode that describe a slow edge hide the slope, so it is fitted before them. From one slow rate, some
+    slopes are found only after them.
     """
     early = _with_poles_and_mode(with_slew_limit(plain, pieces, floors), pieces, floors)
     late = with_slew_limit(best, pieces, floors)

@@ -54,7 +54,7 @@ class LinearPart:
     lead : float
         ln of the factor by which a ringing mode lowers the cost; 0 without such a mode.
     others : sequence of PieceFit
-        Fits with the pole elsewhere in the chain.
+        Fits with the pole elsewhere in the chain, or with a largest slope of the drive.
     late : float
         How much later the steps come than all other motion says, if they contradict it [samples]; otherwise 0.
     """
@@ -66,7 +66,7 @@ class LinearPart:
 
     @property
     def likely(self) -> list[Model]:
-        """Models with the pole elsewhere that describe the records about as well."""
+        """Models with the pole elsewhere, or with a largest slope, that describe the records about as well."""
         return [f.model for f in self.others if f.cost < OPEN * self.fit.cost]
 
     @property

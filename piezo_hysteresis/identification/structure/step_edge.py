@@ -56,4 +56,4 @@ def step_edge_notices(fit: PieceFit) -> list[Notice]:
         return []
     slope = fit.model[AmplifierSlewLimitHeld.name]["S"]
     said = f"the steps rise as behind an amplifier with a largest slope of {slope:.3g} V/s"
-    return [Notice("step_edge", f"{said}; slower motion is late in proportion to its speed")]
+    return [Notice("step_edge", f"{said}; slower motion is late by a time proportional to its speed")]

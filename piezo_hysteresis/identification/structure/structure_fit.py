@@ -57,5 +57,5 @@ def misfit_of(kind: Kind, fit: PieceFit, pieces: Sequence[RecordPiece]) -> float
 
 
 def is_settled(fit: PieceFit, pieces: Sequence[RecordPiece]) -> bool:
-    """Whether nothing else is tried for the steps: a fit describes them, or there is none."""
+    """Whether nothing else is tried for the steps: the fit describes them, or there is no step."""
     return not np.inf > misfit_of(Kind.STEP, fit, pieces) > SETTLED
