@@ -72,14 +72,16 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in lags]
     plain = min(found, key=lambda f: f.cost)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
+    start, late = best, with_slew_limit(best, pieces, floors)
     if not is_settled(best, pieces):
-        limited, its_lead = _behind_slew_limit(plain, best, lead, pieces, floors)
+        limited, its_lead = _behind_slew_limit(plain, late, lead, pieces, floors)
         if max(_shares_left(limited, best, pieces)) < SECOND:
             best, lead = limited, its_lead
     best = _with_second_mode(best, pieces, floors)
     best, *others = in_every_place(best, pieces, floors)
     if AmplifierSlewLimitHeld.name not in best.model:
-        others.append(with_slew_limit(best, pieces, floors))  # it may be as likely as a pole or a delay
+        # it may be as likely as a pole or a delay
+        others.append(late if best is start else with_slew_limit(best, pieces, floors))
     fast = _with_two_more_orders(plain, best, pieces, floors)
     if fast is not best:
         return LinearPart(fast, 0.0)
@@ -140,15 +142,14 @@ def _with_poles_and_mode(
 
 
 def _behind_slew_limit(
-    plain: PieceFit, best: PieceFit, lead: float, pieces: Sequence[RecordPiece], floors: Sequence[float]
+    plain: PieceFit, late: PieceFit, lead: float, pieces: Sequence[RecordPiece], floors: Sequence[float]
 ) -> tuple[PieceFit, float]:
-    """The fit with a largest slope of the drive, and the lead of a ringing mode.
+    """The fit with a largest slope of the drive, and the lead of a ringing mode; `late` has poles and mode already.
 
     Poles and mode that describe a slow edge hide the slope, so it is fitted before them. From one slow rate, some
     slopes are found only after them.
     """
     early = _with_poles_and_mode(with_slew_limit(plain, pieces, floors), pieces, floors)
-    late = with_slew_limit(best, pieces, floors)
     ringing = late if ExtraResonance.name in late.model else with_mode(late, pieces, floors)
     whole = ringing if real_poles(ringing.model) else _with_pole(ringing, pieces, floors)
     return min(early, (whole, lead if ringing is late else _lead(late, ringing)), key=lambda found: found[0].cost)
