@@ -19,7 +19,18 @@ from __future__ import annotations
 import numpy as np
 
 from piezo_hysteresis.compensation import Inverse
-from piezo_hysteresis.effects import BASELINE, CATALOGUE, UNNAMED, Arx, BoucWen, Offset, PublishedBoucWen
+from piezo_hysteresis.effects import (
+    BASELINE,
+    CATALOGUE,
+    FINER_FORMS,
+    MEMORY,
+    UNNAMED,
+    Arx,
+    BoucWen,
+    HysteresisExponent,
+    Offset,
+    PublishedBoucWen,
+)
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 from piezo_hysteresis.stage.simulated import SimulatedStage
@@ -32,6 +43,8 @@ eighth = Arx(a=(-1.6, 0.8, *(0.0,) * 6), b=(0.1, 0.1, *(0.0,) * 6), delay=3)
 base = Model((BoucWen(), arx, Offset()), PERIOD)
 models = [base, base.with_effect(eighth), Model((PublishedBoucWen(), arx), PERIOD)]
 models += [base.with_effect(effect()) for effect in (*CATALOGUE, *UNNAMED) if effect not in BASELINE]
+models += [base.with_effect(MEMORY()).with_effect(effect()) for effect in FINER_FORMS]
+models.append(base.with_effect(HysteresisExponent(n=1.5)))
 for model in models:
     for period in (PERIOD, 1e-3):
         record = Record(DRIVE, DRIVE, period)
