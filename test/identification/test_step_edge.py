@@ -52,10 +52,10 @@ def test_a_step_that_jumps_needs_no_such_limit():
 
 
 def test_behind_a_largest_current_one_slow_rate_predicts_a_fast_one():
-    """Poles and a mode that describe the slow edge hid the slope: the error was 3 %."""
+    """Poles and a mode that describe the slow edge hid the slope: the error was 0.6 %."""
     stage = replace(STAGE, slew=3000.0)
     found = identify(played(stage, 1.0), memory=True)
     assert found.model["amplifier_slew_limit_held"]["S"] == pytest.approx(stage.slew, rel=0.1)
     free = free_per_record(found.model, offset=True)
-    assert errors(found.model, played(stage, 60.0), free).percent < 0.65
+    assert errors(found.model, played(stage, 60.0), free).percent < 0.3
     assert lag_holds(found, stage, PERIOD)

@@ -66,7 +66,7 @@ class AmplifierSlewLimitHeld(Effect):
 
 @kernel
 def run_ramps(x, reach, late, state, y):
-    """Follow x (n,) in ramps of at most `reach` per sample; writes their means y (n,) and updates state [v].
+    """Follow x (n,) in ramps of at most `reach` per sample; writes their effect y (n,) and updates state [v].
 
     A ramp over a whole sample period is late by `late` samples.
     """
