@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Channels in addition to voltage and displacement: names and units."""
+"""Channels in addition to voltage and displacement: names, axes and units."""
 
 from __future__ import annotations
 
@@ -33,6 +33,8 @@ QUANTITIES: Mapping[str, str] = {"voltage": "V", "displacement": "m", "temperatu
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
 """Valid channel names: words of lower-case letters and digits."""
+_AXIS = re.compile(r"(voltage|displacement)_(\d+)")
+"""Channel of a further axis."""
 
 
 def are_finite(samples: Samples) -> bool:
@@ -89,6 +91,18 @@ def quantity_of(name: str) -> str | None:
         return None
     words = [word for word in name.split("_") if word in QUANTITIES]
     return words[0] if len(words) == 1 else None
+
+
+def axis_of(name: str) -> tuple[str, int] | None:
+    """Quantity and number of a channel of a further axis; None for other names.
+
+    Examples
+    --------
+    >>> axis_of("voltage_2"), axis_of("voltage"), axis_of("monitor_voltage")
+    (('voltage', 2), None, None)
+    """
+    match = _AXIS.fullmatch(name)
+    return None if match is None else (match[1], int(match[2]))
 
 
 class ChannelMapping(Mapping[str, Samples]):

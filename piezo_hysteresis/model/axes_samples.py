@@ -16,16 +16,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..channel_mapping import axis_of
 from ..record import Record
-
-_NUMBERED = re.compile(r"(voltage|displacement)_(\d+)")
-"""Channel of a further axis; other names, such as ``monitor_voltage``, are no axis."""
 
 
 def names(record: Record, quantity: str) -> tuple[str, ...]:
@@ -44,8 +41,8 @@ def names(record: Record, quantity: str) -> tuple[str, ...]:
     >>> names(r, "voltage"), names(r, "displacement")
     (('voltage', 'voltage_2'), ('displacement', 'displacement_3'))
     """
-    found = [match for name in record.channels if (match := _NUMBERED.fullmatch(name)) and match[1] == quantity]
-    return (quantity, *(match[0] for match in sorted(found, key=lambda match: int(match[2]))))
+    found = [(axis[1], name) for name in record.channels if (axis := axis_of(name)) and axis[0] == quantity]
+    return (quantity, *(name for _, name in sorted(found)))
 
 
 def columns(record: Record, quantity: str) -> NDArray[np.float64]:

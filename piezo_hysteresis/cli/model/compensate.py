@@ -30,7 +30,7 @@ import numpy as np
 from ...compensation import Limits, Plan, plan
 from ...errors import ModelError, RecordingError
 from ...model import model_file
-from ...recording.formats.wanted_path import read_path
+from ...recording.wanted_path import read_path
 from ...recording.whole_file import whole_file
 from ...report.json_file import write_json
 from ...report.tables.plan_table import answer, notes, plan_table

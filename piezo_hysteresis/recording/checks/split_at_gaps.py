@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...channel_mapping import axis_of
 from ...errors import RecordError
 from ...record import Notice, Record, Samples
 from .short_gaps import Gap, filled, is_held, joined, with_missing_rows
@@ -93,13 +94,17 @@ def split_at_gaps(
     voltage, displacement = channels["voltage"], channels["displacement"]
     if voltage.ndim != 1 or voltage.shape != displacement.shape or voltage.size == 0:
         return [Record(voltage, displacement, sample_period, **labels)], []  # raises the error for the channel
+    for name, values in channels.items():
+        if values.shape != voltage.shape:
+            raise RecordError(f"{name}: got {values.size} samples, expected {voltage.size} as in voltage")
     notices = []
     kept = {}
     for name in channels.keys() - {"voltage", "displacement"}:
         if (np.abs(channels[name]) < LARGEST).all():
             kept[name] = channels[name]
         else:
-            notices.append(Notice("non_finite", f"{name} has non-finite samples; the channel was left out", phase))
+            text = f"{name} has non-finite samples; the channel was left out"
+            notices.append(Notice("non_finite", text, phase, severe=axis_of(name) is not None))
     if not PERIODS[0] <= sample_period <= PERIODS[1]:
         raise RecordError(f"`sample_period`: got {sample_period:g} s, expected {PERIODS[0]:g} to {PERIODS[1]:g} s")
     channels = {name: values for name, values in channels.items() if name in kept or name in _NEEDED}

@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from ...channel_mapping import axis_of
 from ...errors import RecordingError
 from ...record import Experiment, Notice, Record, Samples
 from ..checks.error_context import naming
@@ -32,6 +33,7 @@ from ..checks.split_at_gaps import split_at_gaps
 from ..segmentation.decimating_buffer import averaged_notice, shared_averages
 from ..segmentation.phases import labelled
 from ..table.column_inference import (
+    axis_columns,
     inference_notice,
     inferred_columns,
     inferred_period,
@@ -123,15 +125,17 @@ def _places(values: NpzMembers, options: ReadOptions) -> tuple[dict[str, str], d
     inferred = {c: names[at] for c, at in inferred_columns(names, (), open_).items()}
     place |= inferred
     require_different({c: place[c] for c in (*CHANNELS, *options.columns) if is_channel(c)})
+    names = [name for name in values if name not in place.values()]
+    place = {c: names[at] for c, at in axis_columns(names, ()).items()} | place
     others = {name: name for name in values if is_channel(name) and name not in (*place, *place.values())}
     return others | place, inferred
 
 
-def _period(values: NpzMembers) -> float | None:
-    """Sample period [s] of the first key that is called like one and holds one number."""
+def _period(values: NpzMembers) -> tuple[str, float] | None:
+    """First key that is called like a sample period and holds one number, and the period [s]."""
     for name in values:
         if (found := inferred_period([name])) and values.size(name) == 1:
-            return period_of(name, values.number(name), found[1])
+            return name, period_of(name, values.number(name), found[1])
     return None
 
 
@@ -157,9 +161,11 @@ def _phase(file: Path, options: ReadOptions, average: int, end: float) -> tuple[
         def number(name: str, default: float | None) -> float | None:
             return values.number(place[name]) if place[name] in values else default
 
+        def fits(name: str) -> bool:
+            return values.size(place[name]) == values.size(place["voltage"])
+
         period, gaps, more_notices = _time_base(values, place, options, lambda: channel("time"), average)
-        size = values.size(place["voltage"])
-        others = [c for c in units if c not in CHANNELS and (c in options.columns or values.size(place[c]) == size)]
+        others = [c for c in units if c not in CHANNELS and (c in options.columns or axis_of(c) or fits(c))]
         named = place["phase"] in values or _NUMBERED.match(file.name)
         records, notices = split_at_gaps(
             {name: channel(name) for name in ("voltage", "displacement", *others)},
@@ -189,13 +195,14 @@ def _time_base(
             TimeColumn.of(times()).require(options.sample_period * average)
         return options.sample_period * average, (), []
     if place["sample_period"] in values or "sample_period" in options.columns:
-        period = options.in_si("sample_period", np.array(values.number(place["sample_period"])))
-        return float(period) * average, (), []
+        given = options.in_si("sample_period", np.array(values.number(place["sample_period"])))
+        return float(given) * average, (), []
     if place["time"] in values or "time" in options.columns:
         base = TimeColumn.of(times())
         return base.period, base.gaps, base.notices()
     if (found := _period(values)) is not None:
-        return found * average, (), []
+        name, period = found
+        return period * average, (), list(inference_notice({"sample_period": name}, {}))
     return values.number(place["sample_period"]), (), []  # raises the error that lists the keys
 
 

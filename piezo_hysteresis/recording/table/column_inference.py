@@ -22,6 +22,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
+from ...channel_mapping import axis_of
 from ...errors import RecordingError
 from ...record import Notice
 from .units import plain, units_of
@@ -53,10 +54,26 @@ def unit_in(title: str, channel: str) -> str | None:
     return unit if unit in units_of(channel) else None
 
 
+def named_column(title: str) -> tuple[str, str | None]:
+    """Channel and unit that a column title names, e.g. ``displacement_um``, ``Voltage [V]``.
+
+    >>> named_column("displacement_um"), named_column("Voltage [mV]"), named_column("phase")
+    (('displacement', 'um'), ('voltage', 'mV'), ('phase', None))
+    """
+    name = title.strip().strip('#"').strip()
+    for separator in ("[", "(", " ", "_"):
+        channel, _, unit = name.rpartition(separator) if separator == "_" else name.partition(separator)
+        channel = channel.strip().lower().replace(" ", "_")
+        if plain(unit) in units_of(channel):
+            return channel, plain(unit)
+    return name.lower(), None
+
+
 def inferred_columns(names: Sequence[str], taken: Iterable[int], wanted: Iterable[str]) -> dict[str, int]:
     """Position of the column of each wanted channel that has exactly one candidate.
 
-    A candidate is found by the unit in its title, or else by its words. Two equal candidates leave the channel open.
+    A candidate is found by its name, or else by the unit in its title, or else by its words. Two equal candidates leave
+    the channel open.
 
     Parameters
     ----------
@@ -79,14 +96,39 @@ def inferred_columns(names: Sequence[str], taken: Iterable[int], wanted: Iterabl
         free = [i for i in range(len(names)) if i not in used]
         if channel != "voltage":
             free = [i for i in free if not _NOT_MEASURED.search(names[i])]
+        by_name = [i for i in free if named_column(names[i])[0] == channel]
         by_unit = [i for i in free if unit_in(names[i], channel)]
         by_word = [i for i in free if re.search(_WORDS[channel], names[i].replace("_", " "), re.IGNORECASE)]
-        for candidates in ([i for i in by_unit if i in by_word], by_unit, by_word):
+        for candidates in (by_name, [i for i in by_unit if i in by_word], by_unit, by_word):
             if candidates:
                 if len(candidates) == 1:
                     found[channel] = candidates[0]
                     used.add(candidates[0])
                 break
+    return found
+
+
+def axis_columns(titles: Sequence[str], taken: Iterable[int]) -> dict[str, int]:
+    """Position of the column of every further axis that is named by its number.
+
+    Parameters
+    ----------
+    titles : sequence of str
+        Titles of columns, or names of variables.
+    taken : iterable of int
+        Positions of columns that are used already.
+
+    Examples
+    --------
+    >>> axis_columns(["voltage", "voltage_2", "Displacement 3 [um]", "monitor_voltage"], (0,))
+    {'voltage_2': 1, 'displacement_3': 2}
+    """
+    used = set(taken)
+    found: dict[str, int] = {}
+    for at, title in enumerate(titles):
+        name = named_column(title)[0].replace(" ", "_")
+        if at not in used and axis_of(name):
+            found.setdefault(name, at)
     return found
 
 

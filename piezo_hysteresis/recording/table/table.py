@@ -25,28 +25,19 @@ from ...errors import RecordingError
 from ...record import Notice, Record, Samples
 from ..checks.split_at_gaps import split_at_gaps
 from ..segmentation.phases import labelled
-from .column_inference import inference_notice, inferred_columns, require_different, unit_in
+from .column_inference import (
+    axis_columns,
+    inference_notice,
+    inferred_columns,
+    named_column,
+    require_different,
+    unit_in,
+)
 from .read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from .time_column import TimeColumn, without_duplicates
-from .units import plain, units_of
 
 Mark = tuple[int, Mapping[str, str]]
 """First row of a record and its labels."""
-
-
-def named_column(title: str) -> tuple[str, str | None]:
-    """Channel and unit that a column title names, e.g. ``displacement_um``, ``Voltage [V]``.
-
-    >>> named_column("displacement_um"), named_column("Voltage [mV]"), named_column("phase")
-    (('displacement', 'um'), ('voltage', 'mV'), ('phase', None))
-    """
-    name = title.strip().strip('#"').strip()
-    for separator in ("[", "(", " ", "_"):
-        channel, _, unit = name.rpartition(separator) if separator == "_" else name.partition(separator)
-        channel = channel.strip().lower().replace(" ", "_")
-        if plain(unit) in units_of(channel):
-            return channel, plain(unit)
-    return name.lower(), None
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +78,7 @@ def resolve(titles: Sequence[str], width: int, options: ReadOptions) -> Places:
     for at, (name, unit) in enumerate(parsed):
         if (name in CHANNELS or name in LABELS or _is_further(titles[at], name)) and name not in places:
             places[name] = (at, unit)
+    chosen: dict[str, tuple[int, str | None]] = {}
     for channel, column in options.columns.items():
         if isinstance(column, int):
             at = column - 1
@@ -95,7 +87,9 @@ def resolve(titles: Sequence[str], width: int, options: ReadOptions) -> Places:
             at = matches[0] if matches else width
         if at >= width:
             raise RecordingError(f"`columns`: got {column!r} for {channel}, expected {_listed(titles, width)}")
-        places[channel] = (at, unit_in(titles[at], channel) if titles else None)
+        chosen[channel] = (at, unit_in(titles[at], channel) if titles else None)
+    used = {at for at, _ in chosen.values()}
+    places = {c: p for c, p in places.items() if c in (*CHANNELS, *LABELS) or p[0] not in used} | chosen
     open_ = [c for c in ("time", "voltage", "displacement") if c not in places]
     if "time" in open_ and options.sample_period is not None:
         open_.remove("time")  # an inferred column must not contradict the others
@@ -110,8 +104,11 @@ def resolve(titles: Sequence[str], width: int, options: ReadOptions) -> Places:
                 f"{channel}={free}"
             )
     require_different({channel: at for channel, (at, _) in places.items() if is_channel(channel)})
-    names = {channel: titles[at].strip() for channel, at in found.items()}
-    return Places(places, inference_notice(names, {channel: places[channel][1] for channel in found}))
+    axes = axis_columns(titles, (at for at, _ in places.values()))
+    places = {channel: (at, parsed[at][1]) for channel, at in axes.items()} | places
+    by_title = {c: place for c, place in places.items() if is_channel(c) and c not in options.columns}
+    names = {channel: titles[at].strip() for channel, (at, _) in by_title.items()} if found else {}
+    return Places(places, inference_notice(names, {channel: unit for channel, (_, unit) in by_title.items()}))
 
 
 def _is_further(title: str, name: str) -> bool:

@@ -78,6 +78,12 @@ def test_titles_of_other_software_are_understood_where_they_leave_no_doubt(tmp_p
     assert all(title in notice.message for title in titles.split(";")[1:])
 
 
+def test_the_notice_of_columns_names_all_that_are_used(tmp_path):
+    (tmp_path / "t.csv").write_text(text(";", "Time (s);Drive (V);Axis 1 Displacement (um)\n"))
+    (notice,) = (n for n in read(tmp_path / "t.csv").notices if n.kind == "columns")
+    assert "time = 'Time (s)' in s" in notice.message
+
+
 def test_titles_that_leave_a_doubt_are_not_guessed(tmp_path):
     (tmp_path / "t.csv").write_text(text(";", "t [s];Sensor A [um];Sensor B [um]\n"))
     with pytest.raises(RecordingError, match="expected a column for voltage"):

@@ -23,11 +23,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import RecordingError
-from ..table.column_inference import inferred_columns, unit_in
-from ..table.dialect import decoded
-from ..table.table import named_column
-from ..table.units import si_factor
+from ..errors import RecordingError
+from .table.column_inference import inferred_columns, named_column, unit_in
+from .table.dialect import decoded
+from .table.units import si_factor
 
 Array = NDArray[np.float64]
 
@@ -60,7 +59,9 @@ def read_path(path: str | Path) -> tuple[Array, float | None]:
 
 def _from_npz(place: Path) -> tuple[Array, float | None]:
     try:
-        with place.open("rb") as file, np.load(file, allow_pickle=False) as held:
+        with place.open("rb") as file, zipfile.ZipFile(file):  # np.load takes other files for pickled objects
+            pass
+        with np.load(place, allow_pickle=False) as held:
             if "displacement" not in held:
                 raise RecordingError(f"{place}: got {', '.join(held) or 'nothing'}, expected a key 'displacement' [m]")
             period = float(held["sample_period"]) if "sample_period" in held else None
