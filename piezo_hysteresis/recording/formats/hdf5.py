@@ -18,7 +18,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from numpy.typing import NDArray
 
 from ...errors import RecordingError
 from ..segmentation.decimating_buffer import DecimatingBuffer
+from ..table.column_inference import inferred_period
 from ..table.read_options import ReadOptions
 from .named_arrays import NamedArrays
 
@@ -52,6 +54,8 @@ def is_hdf5(path: Path) -> bool:
 
 class Hdf5Arrays(NamedArrays):
     """Dotted name to array, that of MATLAB oriented as there; texts are arrays of one string.
+
+    An attribute of the file that holds a sample period or a sample rate is called ``attributes.name``.
 
     Parameters
     ----------
@@ -81,6 +85,7 @@ class Hdf5Arrays(NamedArrays):
 
         try:
             self._file.visititems(note)
+            self._attributes = {f"attributes.{name}": np.asarray(value) for name, value in _periods(self._file.attrs)}
         except BaseException:
             self._file.close()
             raise
@@ -89,10 +94,12 @@ class Hdf5Arrays(NamedArrays):
         self._file.close()
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._paths)
+        return iter((*self._paths, *self._attributes))
 
     def title(self, name: str) -> str:
         """Name of an array, with its unit in parentheses where an attribute states one."""
+        if name in self._attributes:
+            return name
         attributes = self._file[self._paths[name]].attrs
         for key in _UNITS:
             if key not in attributes:
@@ -106,10 +113,15 @@ class Hdf5Arrays(NamedArrays):
                 return f"{name} ({text.strip('[]() ')})"
         return name
 
+    def shape(self, name: str) -> tuple[int, ...]:
+        if name in self._attributes:
+            return ()
+        shape = tuple(self._file[self._paths[name]].shape or ())
+        return shape[::-1] if self._rows_last else shape
+
     def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
         dataset = self._numbers(name)
-        shape = tuple(dataset.shape[::-1]) if self._rows_last else tuple(dataset.shape)
-        self.check_column(name, shape, column)
+        self.check_column(name, column)
         last = dataset.ndim - 1 if self._rows_last else 0
         along = last if column is not None else int(np.argmax(dataset.shape))
 
@@ -121,6 +133,8 @@ class Hdf5Arrays(NamedArrays):
         return self.in_pieces(name, dataset.shape[along], options, piece)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
+        if name in self._attributes:
+            return self._attributes[name]
         dataset = self._numbers(name)
         values = np.asarray(dataset[()]).T
         if dataset.attrs.get("MATLAB_class") == b"char":
@@ -129,6 +143,8 @@ class Hdf5Arrays(NamedArrays):
 
     def _numbers(self, name: str) -> Any:
         """The dataset of a name, its size checked."""
+        if name in self._attributes:
+            raise RecordingError(f"{name}: got one number, expected an array")
         dataset = self._file[self._paths[name]]
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # a type that numpy cannot represent is not supported
@@ -145,3 +161,14 @@ class Hdf5Arrays(NamedArrays):
         if size > _LARGEST_EXPANSION * (dataset.id.get_storage_size() + 1000):
             raise RecordingError(f"{name}: declares {size} bytes, more than the file can hold")
         return dataset
+
+
+def _periods(attributes: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """Attributes that are called like a sample period or a sample rate, and hold one positive number."""
+    for name in attributes:
+        if inferred_period([name]) is None:
+            continue
+        with suppress(OSError, TypeError, ValueError):  # of a type that h5py or numpy cannot read
+            value = np.asarray(attributes[name])
+            if value.size == 1 and value.dtype.kind in "fiu" and 0.0 < (number := float(value.reshape(()))) < math.inf:
+                yield name, number

@@ -97,13 +97,14 @@ class Mat5Arrays(NamedArrays):
             raise KeyError(name)
         return self._variable(top)[name]
 
+    def shape(self, name: str) -> tuple[int, ...]:
+        return self._long[name].shape if name in self._long else self[name].shape
+
     def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
-        matrix = self._long.get(name)
-        shape = self[name].shape if matrix is None else matrix.shape
-        self.check_column(name, shape, column)
-        if matrix is not None:
+        self.check_column(name, column)
+        if (matrix := self._long.get(name)) is not None:
             buffer = DecimatingBuffer.of(1, options)
-            count = math.prod(shape) if column is None else shape[0]
+            count = math.prod(matrix.shape) if column is None else matrix.shape[0]
             _read(self._path, matrix, (column or 0) * count, count, buffer)
             return buffer
         values = self[name].ravel() if column is None else self[name][:, column]

@@ -52,6 +52,10 @@ class NamedArrays(Mapping[str, NDArray[Any]]):
         return name
 
     @abstractmethod
+    def shape(self, name: str) -> tuple[int, ...]:
+        """Shape of an array, with the axes ordered as in MATLAB."""
+
+    @abstractmethod
     def close(self) -> None:
         """Close the file, and release what was read from it."""
 
@@ -108,10 +112,10 @@ class NamedArrays(Mapping[str, NDArray[Any]]):
                 break
         return buffer
 
-    @staticmethod
-    def check_column(name: str, shape: tuple[int, ...], column: int | None) -> None:
-        """Raise RecordingError if an array of this shape has no such column, or has several and none is chosen."""
+    def check_column(self, name: str, column: int | None) -> None:
+        """Raise RecordingError if an array has no such column, or has several and none is chosen."""
+        shape = self.shape(name)
         if column is None and math.prod(shape) != max(shape, default=1):
             raise RecordingError(f"{name}: got shape {shape}, expected a vector; choose a column as {name}[1]")
         if column is not None and (len(shape) != 2 or column >= shape[1]):
-            raise RecordingError(f"{name}: got shape {shape}, expected a matrix with that column")
+            raise RecordingError(f"{name}: got shape {shape}, expected a matrix with a column {column + 1}")

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib.format import MAGIC_PREFIX
 from numpy.typing import NDArray
 
 from ...errors import RecordingError
@@ -40,12 +41,15 @@ class NpyArrays(NamedArrays):
     Raises
     ------
     RecordingError
-        If it holds pickled objects, or an array that is neither structured nor a matrix of columns.
+        If it is no NumPy file, holds pickled objects, or its array is neither structured nor a matrix of columns.
     """
 
     kind = "the columns"
 
     def __init__(self, path: Path) -> None:
+        with path.open("rb") as file:
+            if file.read(len(MAGIC_PREFIX)) != MAGIC_PREFIX:
+                raise RecordingError("got other first bytes than a NumPy array has, expected a file of numpy.save")
         array = np.load(path, mmap_mode="r", allow_pickle=False)
         if array.dtype.names is not None and array.ndim == 1:
             self._columns = {name: array[name] for name in array.dtype.names}
@@ -64,7 +68,10 @@ class NpyArrays(NamedArrays):
     def __getitem__(self, name: str) -> NDArray[Any]:
         return np.asarray(self._columns[name])
 
+    def shape(self, name: str) -> tuple[int, ...]:
+        return self._columns[name].shape
+
     def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
         values = self._columns[name]
-        self.check_column(name, values.shape, column)
+        self.check_column(name, column)
         return self.in_pieces(name, values.size, options, lambda part: np.asarray(values[part]))

@@ -16,29 +16,29 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from numpy.typing import NDArray
 
+from ...channel_mapping import axis_of
 from ...errors import RecordingError
 from ...record import Notice, Record
 from ..segmentation.decimating_buffer import DecimatingBuffer, averaged_notice
 from ..table.column_inference import (
+    axis_columns,
     inference_notice,
     inferred_columns,
     inferred_period,
+    named_column,
     period_of,
     require_different,
     unit_in,
 )
 from ..table.read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from ..table.table import table_records
+from .array_place import ArrayPlace, example, listed
 from .named_arrays import NamedArrays
-
-_PLACE = re.compile(r"(?P<name>[^\[\]]+?)(\[(?P<column>[1-9]\d{0,8})\])?")
-"""Form of the place of a channel: ``name[column]``."""
 
 
 def records_from_arrays(
@@ -62,30 +62,23 @@ def records_from_arrays(
     RecordingError, RecordError
         If voltage or displacement is not found, or they form no record.
     """
-    fields = [name.removeprefix(prefix) for name in arrays if name.startswith(prefix)]
-    open_ = [c for c in CHANNELS if c not in options.columns and prefix + c not in arrays]
-    with_unit = {name for name in fields for c in open_ if name.startswith(f"{c}_") and unit_in(name, c)}
-    others = [name for name in (*fields, *options.columns) if is_channel(name) and name not in with_unit]
-    given = {c: str(options.columns.get(c, prefix + c)) for c in (*CHANNELS, *others, *LABELS)}
-    places = {c: place for c, place in given.items() if c in options.columns or place in arrays}
-    labels = {name: _label(arrays[places[name]], places[name]) for name in LABELS if name in places}
-    if options.sample_period is None and "sample_period" not in places and (found := _period(arrays, places)):
-        labels["sample_period"] = repr(found)
-    timed = options.sample_period is not None or "sample_period" in labels
-    names = [name for name in arrays if name not in places.values()]
-    wanted = [c for c in ("time", "voltage", "displacement") if c not in places and not (c == "time" and timed)]
-    titles = [arrays.title(name) for name in names]
-    found_at = inferred_columns([title.rpartition(".")[2] for title in titles], (), wanted)
-    places |= {c: names[at] for c, at in found_at.items()}
-    for channel in ("voltage", "displacement"):
-        if channel not in places:
-            raise RecordingError(f"got {_listed(arrays)}, expected {given[channel]}; name it by `columns`")
-    require_different({c: place for c, place in places.items() if is_channel(c)})
-    units = {c: unit_in(arrays.title(p) if p in arrays else p, c) for c, p in places.items() if is_channel(c)}
-    buffers = {c: _channel(arrays, places[c], options) for c in units}
+    places, inferred, period = _places(arrays, prefix, options)
+    labels = {name: _label(arrays[place.name], str(place)) for name, place in places.items() if name in LABELS}
+    if period is not None:
+        labels["sample_period"] = repr(period)
+    elif not ("time" in places or "sample_period" in labels or options.sample_period is not None):
+        raise RecordingError(
+            f"got {listed(arrays)}, expected times or one number that is called sample_period, dt, ts or fs; give "
+            "`sample_period`"
+        )
+    channels = {c: place for c, place in places.items() if is_channel(c)}
+    require_different({c: str(place) for c, place in channels.items()})
+    titles = {c: str(place) if place.column else arrays.title(place.name) for c, place in channels.items()}
+    units = {c: unit_in(title, c) for c, title in titles.items()}
+    buffers = {c: _samples(arrays, place, options) for c, place in channels.items()}
     columns = {c: options.in_si(c, buffer.column(0), units[c]) for c, buffer in buffers.items()}
-    needed = {*CHANNELS, *options.columns}
-    columns = {c: v for c, v in columns.items() if c in needed or v.size == columns["voltage"].size}
+    needed, size = {*CHANNELS, *options.columns}, columns["voltage"].size
+    columns = {c: values for c, values in columns.items() if c in needed or axis_of(c) or values.size == size}
     sizes = {name: values.size for name, values in columns.items()}
     if len(set(sizes.values())) > 1:
         raise RecordingError(f"got channels of {sizes} samples, expected equal lengths")
@@ -94,24 +87,62 @@ def records_from_arrays(
     records, notices = table_records(columns, [(0, labels)], rest, before, truncated=options.passes_over)
     if options.average is None and average > 1:
         notices.append(averaged_notice(average, records[0].sample_period, labels.get("phase", "")))
-    return records, [*notices, *inference_notice({c: titles[at] for c, at in found_at.items()}, units)]
+    return records, [*notices, *inference_notice(inferred, units)]
 
 
-def _period(arrays: NamedArrays, places: Mapping[str, str]) -> float | None:
-    """Sample period [s] of the first variable that is called like one and holds one number."""
+def _places(
+    arrays: NamedArrays, prefix: str, options: ReadOptions
+) -> tuple[dict[str, ArrayPlace], dict[str, str], float | None]:
+    """Place of every channel and label, the titles of those that were inferred, and an inferred sample period [s]."""
+    places = {c: ArrayPlace.of(arrays, str(text), c) for c, text in options.columns.items()}
+    used = {str(place) for place in places.values()}
+    open_ = [c for c in CHANNELS if c not in places and prefix + c not in arrays]
+    for field in (name.removeprefix(prefix) for name in arrays if name.startswith(prefix)):
+        has_unit = any(field.startswith(f"{c}_") and unit_in(field, c) for c in open_) or _is_axis_with_unit(field)
+        is_further = is_channel(field) and not has_unit and prefix + field not in used
+        if field not in places and (field in CHANNELS or field in LABELS or is_further):
+            places[field] = ArrayPlace(prefix + field)
+    inferred, period = {}, None
+    if options.sample_period is None and "sample_period" not in places and (found := _period(arrays, places)):
+        inferred["sample_period"], period = found
+    timed = options.sample_period is not None or "sample_period" in places or period is not None
+    names = [name for name in arrays if name not in _names(places)]
+    wanted = [c for c in ("time", "voltage", "displacement") if c not in places and not (c == "time" and timed)]
+    titles = [arrays.title(name) for name in names]
+    for channel, at in inferred_columns([title.rpartition(".")[2] for title in titles], (), wanted).items():
+        places[channel], inferred[channel] = ArrayPlace(names[at]), titles[at]
+    for channel in ("voltage", "displacement"):
+        if channel not in places:
+            hint = example(arrays, channel, _names(places))
+            raise RecordingError(f"got {listed(arrays)}, expected {prefix}{channel}{hint}")
+    group = places["voltage"].name.rpartition(".")[0]
+    names = [name for name in arrays if name.rpartition(".")[0] == group and name not in _names(places)]
+    titles = [arrays.title(name) for name in names]
+    for channel, at in axis_columns([title.removeprefix(f"{group}.") for title in titles], ()).items():
+        if channel not in places:
+            places[channel], inferred[channel] = ArrayPlace(names[at]), titles[at]
+    return places, inferred, period
+
+
+def _names(places: Mapping[str, ArrayPlace]) -> set[str]:
+    return {place.name for place in places.values()}
+
+
+def _is_axis_with_unit(field: str) -> bool:
+    name = named_column(field)[0]
+    return name != field and axis_of(name) is not None
+
+
+def _period(arrays: NamedArrays, places: Mapping[str, ArrayPlace]) -> tuple[str, float] | None:
+    """Name of the first variable that is called like a sample period and holds one number, and the period [s]."""
     for name in arrays:
-        if name not in places.values() and (found := inferred_period([name])) and arrays[name].size == 1:
-            return period_of(name, float(_label(arrays[name], name)), found[1])
+        if name not in _names(places) and (found := inferred_period([name])) and arrays[name].size == 1:
+            return name, period_of(name, float(_label(arrays[name], name)), found[1])
     return None
 
 
-def _channel(arrays: NamedArrays, place: str, options: ReadOptions) -> DecimatingBuffer:
-    match = _PLACE.fullmatch(place)
-    name, number = (match["name"], match["column"]) if match else (place, None)
-    if name not in arrays:
-        raise RecordingError(f"got {_listed(arrays)}, expected {place}")
-    column = None if number is None else int(number) - 1
-    return arrays.samples(name, column, options)
+def _samples(arrays: NamedArrays, place: ArrayPlace, options: ReadOptions) -> DecimatingBuffer:
+    return arrays.samples(place.name, None if place.column is None else place.column - 1, options)
 
 
 def _label(value: NDArray[Any], place: str) -> str:
@@ -119,7 +150,3 @@ def _label(value: NDArray[Any], place: str) -> str:
         raise RecordingError(f"{place}: got {value.dtype} of shape {value.shape}, expected one text or number")
     item = value.reshape(()).item()
     return str(int(item)) if isinstance(item, bool) else str(item)
-
-
-def _listed(arrays: NamedArrays) -> str:
-    return f"{arrays.kind} " + ", ".join(list(arrays)[:30])

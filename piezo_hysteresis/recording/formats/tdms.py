@@ -95,7 +95,10 @@ class TdmsArrays(NamedArrays):
             return np.array(list(self._increments))
         return np.asarray(self._channels[name][:])
 
+    def shape(self, name: str) -> tuple[int, ...]:
+        return (len(self._increments if name == "dt" else self._channels[name]),)
+
     def samples(self, name: str, column: int | None, options: ReadOptions) -> DecimatingBuffer:
         channel = self._channels[name]
-        self.check_column(name, (len(channel),), column)
+        self.check_column(name, column)
         return self.in_pieces(name, len(channel), options, lambda part: _numbers(channel[part], channel))
