@@ -124,9 +124,11 @@ def identify_axes(
             Regression(model.regressors(u)[:, :used], y, fitted_from(record, settling), weight)
             for record, u, y, weight in zip(records, voltages, displacements, weights, strict=True)
         ]
-        h, zero = impulse_responses(parts, length)
+        # a play wider than its elongation never moves; of fewer displacements than drives some elongations are small
+        moving = [j for j in range(used) if j < LINEAR_TERMS * inputs or any(part.x[:, j].any() for part in parts)]
+        h, zero = impulse_responses([replace(part, x=part.x[:, moving]) for part in parts], length)
         taps = model.taps.copy()
-        taps[-1, :, :, :used] = h
+        taps[-1][:, :, moving] = h
         model = replace(model, taps=taps, zero=zero)
         if number == 0:
             static = taps[0].sum(axis=1)[:, : LINEAR_TERMS * inputs].reshape(outputs, LINEAR_TERMS, inputs).sum(axis=1)

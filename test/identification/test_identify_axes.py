@@ -28,14 +28,15 @@ GAINS = 1e-6 * np.array([[-2.8, 1.5, -3.5], [0.5, -3.5, -4.0], [-3.5, -4.5, 1.7]
 LAG, WIDTH, SHARE = 0.5, 0.05, 0.4
 
 
-def plant(seed, share=SHARE, size=3000):
-    u = 0.2 * np.random.default_rng(seed).standard_normal((size, 3))
-    x, h, y = np.zeros(3), np.zeros(3), np.empty((size, 3))
+def plant(seed, share=SHARE, size=3000, gains=GAINS):
+    outputs, inputs = gains.shape
+    u = 0.2 * np.random.default_rng(seed).standard_normal((size, inputs))
+    x, h, y = np.zeros(inputs), np.zeros(inputs), np.empty((size, outputs))
     for k in range(size):
         x = LAG * x + (1 - LAG) * u[k]
         h = np.clip(h, x - WIDTH, x + WIDTH)
-        y[k] = GAINS @ (x + share * h)
-    others = {f"{q}_{i + 1}": a[:, i] for q, a in (("voltage", u), ("displacement", y)) for i in (1, 2)}
+        y[k] = gains @ (x + share * h)
+    others = {f"{q}_{i + 1}": a[:, i] for q, a in (("voltage", u), ("displacement", y)) for i in range(1, a.shape[1])}
     return Record(u[:, 0], y[:, 0], 1e-3, f"noise_{seed}", channels=others)
 
 
@@ -79,6 +80,26 @@ def test_two_drives_move_three_displacements():
         for r in records
     ]
     assert identify_axes(two, length=10).run(np.zeros((5, 2)), identify_axes(two, length=10).rest())[0].shape == (5, 3)
+
+
+@pytest.mark.parametrize(
+    "gains", [[[1.0, 1.0]], [[1.0, 0.07]], [[2.0, 1.0, -1.0], [0.3, -2.0, 1.0]], [[1.0], [-0.4]]], ids=str
+)
+def test_numbers_of_drives_and_displacements_may_differ(gains):
+    gains = 1e-6 * np.array(gains)
+    records = [plant(seed, gains=gains) for seed in (1, 2)]
+    left = {
+        passes: sum(e.rms for e in axes_errors(identify_axes(records, 20, passes=passes), [plant(3, gains=gains)]))
+        for passes in (1, 3)
+    }
+    assert left[3] < left[1]
+
+
+def test_drives_that_depend_on_one_another_are_refused():
+    records = [plant(seed, gains=np.array([[1e-6, 1e-6]])) for seed in (1, 2)]
+    same = [Record(r.voltage, r.displacement, 1e-3, channels={"voltage_2": 0 * r.voltage}) for r in records]
+    with pytest.raises(IdentificationError, match="constant or depend on one another"):
+        identify_axes(same, length=10)
 
 
 def test_invalid_records_and_files_are_refused(model, tmp_path):
