@@ -59,10 +59,21 @@ def load(path: str | Path) -> AxesModel:
         If there is no such file, or it is not a model of several axes.
     """
     path = Path(path).expanduser()
+    expected = "expected a model of several axes, as piezo identify writes it"
     try:
+        with path.open("rb") as file, zipfile.ZipFile(file):  # np.load takes other files for pickled objects
+            pass
         with np.load(path, allow_pickle=False) as file:
+            if missing := [name for name in _NAMES if name not in file]:
+                raise ModelError(f"{path}: got an NPZ file without '{missing[0]}', {expected}")
             values = {name: file[name] for name in _NAMES}
         period, reference, memory = (float(values[name]) for name in ("sample_period", "reference", "memory"))
-    except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
-        raise ModelError(f"{path}: expected a model of several axes, as `piezo identify` writes it: {error}") from None
+    except OSError as error:
+        raise ModelError(f"{path}: {error.strerror or error}, {expected}") from None
+    except zipfile.BadZipFile:
+        raise ModelError(f"{path}: got no NPZ file, {expected}") from None
+    except ModelError:
+        raise
+    except (ValueError, TypeError) as error:
+        raise ModelError(f"{path}: damaged ({error}), {expected}") from None
     return AxesModel(values["taps"], values["elongation"], values["radii"], values["zero"], period, reference, memory)

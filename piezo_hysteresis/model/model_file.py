@@ -40,6 +40,9 @@ _HEADER = """\
 _LONGEST_CHARACTER = 4
 """Bytes of a character in UTF-8 at most."""
 
+_ARCHIVE = b"PK\x03\x04"
+"""First bytes of an NPZ file."""
+
 _PROVENANCE = {
     "free_run_error": "m; rms in free run, on data left out where there were any",
     "free_run_error_percent": "% of the displacement range",
@@ -116,15 +119,28 @@ def loads(text: str, source: str = "model file") -> Model:
     return from_parameters(found[0], source)
 
 
+def require_name(path: str | Path) -> None:
+    """Refuse a name that is not one of a model of one axis.
+
+    Raises
+    ------
+    ModelError
+        If it ends in ``.npz``.
+    """
+    if Path(path).suffix == ".npz":
+        raise ModelError(f"{path}: a model of one axis is a YAML file; give it a name that ends in .yaml")
+
+
 def save(model: Model, path: str | Path) -> Path:
     """Write a model file, which appears only when it is complete; returns its path.
 
     Raises
     ------
     ModelError
-        If the file cannot be written.
+        If the name ends in ``.npz`` or the file cannot be written.
     """
     path = Path(path).expanduser()
+    require_name(path)
     text = dumps(model)
     draft = path.with_name(path.name + ".tmp")
     try:
@@ -148,7 +164,13 @@ def load(path: str | Path) -> Model:
     """
     path = Path(path).expanduser()
     try:
-        text = read_regular_file(path, _LONGEST_CHARACTER * (LONGEST_TEXT + 1)).decode("utf-8")
+        raw = read_regular_file(path, _LONGEST_CHARACTER * (LONGEST_TEXT + 1))
+        if raw.startswith(_ARCHIVE):
+            raise ModelError(
+                f"{path}: got an NPZ file, as a model of several axes is, expected a model file of one axis; piezo "
+                "identify and piezo validate handle several axes"
+            )
+        text = raw.decode("utf-8")
     except RecordingError as error:
         raise ModelError(str(error)) from None
     except OSError as error:

@@ -132,6 +132,8 @@ def _of_recording(args: argparse.Namespace) -> Diagnosis:
         raise ParameterError("diagnose: got no recording, expected one or several, or --stage FILE")
     require_new_results(args)
     require_new_file("--correction", args.correction, args.force)
+    for path in filter(None, (args.output, args.correction)):
+        model_file.require_name(path)
     start = None if args.model is None else model_file.load(args.model)
     experiment = reading_options.read(args)
     with progress("diagnose", usual_time(experiment.size, "5 s", 2)) as report_progress:

@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
         On a model that cannot be read or exported, a name that is no identifier, or a folder that holds files.
     """
     require_new_folder("-o", args.output, args.force)
-    model = _load(args.model)
+    model = model_file.load(args.model)
     inverse, why_not = _inverse(model, args)
     files = (c_program if args.to == "c" else fmus)(model, args.name, inverse)
     _write(files, Path(args.output).expanduser())
@@ -121,12 +121,6 @@ def _inverse(model: Model, args: argparse.Namespace) -> tuple[Inverse | None, st
     except ModelError as error:
         return None, str(error).partition(";")[0]
     return inverse, ""
-
-
-def _load(path: str) -> Model:
-    if Path(path).suffix == ".npz":
-        raise ModelError(f"{path}: a model of several axes cannot be exported, expected a model file of one axis")
-    return model_file.load(path)
 
 
 def _write(files: Mapping[str, str] | Mapping[str, bytes], folder: Path) -> None:

@@ -49,6 +49,7 @@ def run(args: argparse.Namespace) -> int:
         If the input is invalid, or the stage does not move in the records.
     """
     require_new_results(args)
+    model_file.require_name(args.output)
     model = model_file.load(args.model)
     experiment = reading_options.read(args)
     found = recalibrate(model, experiment)
