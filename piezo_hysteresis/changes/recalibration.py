@@ -38,6 +38,7 @@ from ..identification.records.conditioning_split import conditioning_length, cov
 from ..identification.records.excitation_check import check_motion, moves
 from ..identification.records.noise import without_voltage_noise
 from ..identification.records.noise_floor import floors, stroke
+from ..identification.records.one_axis import one_axis
 from ..model.model import Model
 from ..model.provenance import LARGEST, MOVING, known_error, provenance, record_errors
 from ..record import CONDITIONING, Experiment, Notice, Record
@@ -121,8 +122,12 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
         their bounds.
     ModelError
         If the records are faster than the model.
+    RecordError
+        If a record has several drives.
     """
-    quiet, notices = without_voltage_noise(experiment)
+    axes_notices = one_axis(experiment)
+    quiet, noise_notices = without_voltage_noise(experiment)
+    notices = (*axes_notices, *noise_notices)
     records = _after_a_loop(quiet.records)
     used = [i for i, r in enumerate(records) if moves(r) and r.phase != CONDITIONING]
     used = [i for i in used if not records[i].truncated] or used

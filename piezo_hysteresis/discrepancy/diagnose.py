@@ -92,7 +92,7 @@ def diagnose(
         If the time limit is not positive, no core may be used, or `effects` holds something else than classes of
         effects.
     RecordError
-        If `experiment` holds no records.
+        If `experiment` holds no records, or one of several drives.
     IdentificationError
         If the drive does not move in any record that is compared with a model, or the displacement is constant.
     """

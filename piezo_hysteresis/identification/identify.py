@@ -44,6 +44,7 @@ from .records.conditioning import records_to_fit
 from .records.conditioning_split import known_from_within
 from .records.leading_step import Blocks, steps_apart
 from .records.noise import sensor_noise, without_voltage_noise
+from .records.one_axis import one_axis
 from .records.roles import HELD_OUT, roles_of
 from .steps.comparison import InputComparison, compare_inputs
 from .steps.dynamics import Dynamics, delay_of
@@ -109,7 +110,7 @@ def identify(
     IdentificationError
         If the drive does not move in any record, or a fit cannot be started.
     RecordError
-        If `experiment` holds no records, or `held_out` names a phase that it does not have.
+        If `experiment` holds no records or one of several drives, or `held_out` names a phase that it does not have.
     ParameterError
         If a scale is not positive, or `gain` is 0.
 
@@ -121,7 +122,9 @@ def identify(
     """
     report = progress or (lambda word, fraction: None)
     check_gauge(voltage_scale, displacement_scale, gain, hysteresis)
-    recorded, conditioning_notices = known_from_within(experiment_of(experiment))
+    given = experiment_of(experiment)
+    axes_notices = one_axis(given)
+    recorded, conditioning_notices = known_from_within(given)
     roles = roles_of(recorded, held_out)
     experiment, noise_notices = without_voltage_noise(recorded)
     records = experiment.records
@@ -139,7 +142,7 @@ def identify(
     scale_y = reach if displacement_scale is None else displacement_scale
     floors = [max(c.noise, ADEQUACY * reach) for c in roles.contents]
     period = experiment.fastest_period
-    notices: list[Notice] = [*experiment.notices, *conditioning_notices, *noise_notices]
+    notices: list[Notice] = [*experiment.notices, *axes_notices, *conditioning_notices, *noise_notices]
 
     report("step 1: delay", 0.0)
     delay = delay_of_steps(experiment, roles, notices)

@@ -174,12 +174,12 @@ def axes_errors(model: AxesModel, records: Sequence[Record]) -> list[AxisError]:
 
 def _checked(records: Sequence[Record]) -> tuple[list[Array], list[Array]]:
     first = records[0]
-    for record in records:
+    for number, record in enumerate(records, 1):
         for quantity in ("voltage", "displacement"):
             if names(record, quantity) != names(first, quantity):
                 raise IdentificationError(
-                    f"{record.phase}: got {', '.join(names(record, quantity))}, "
-                    f"expected {', '.join(names(first, quantity))} as in {first.phase}"
+                    f"record {number} ({record.phase}): got {', '.join(names(record, quantity))}, expected "
+                    f"{', '.join(names(first, quantity))} as in record 1 ({first.phase})"
                 )
         if not np.isclose(record.sample_period, first.sample_period, rtol=1e-3):
             raise IdentificationError(

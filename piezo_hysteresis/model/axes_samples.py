@@ -51,6 +51,6 @@ def columns(record: Record, quantity: str) -> NDArray[np.float64]:
     return np.column_stack([held[name] for name in names(record, quantity)])
 
 
-def has_several_drives(records: Iterable[Record]) -> bool:
-    """Whether any record holds more than one drive voltage."""
-    return any(len(names(record, "voltage")) > 1 for record in records)
+def has_several_axes(records: Iterable[Record]) -> bool:
+    """Whether any record holds more than one drive voltage, or more than one displacement."""
+    return any(len(names(record, quantity)) > 1 for record in records for quantity in ("voltage", "displacement"))

@@ -19,13 +19,13 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ...effects import MEMORY, OPERATORS, PublishedBoucWen
+from ...effects import HYSTERESIS, MEMORY, OPERATORS, PublishedBoucWen
 from ...identification.identification import Identification, undetermined
 from ...identification.identify import identify
 from ...identification.records.roles import HELD_OUT
 from ...identification.structure.mode import assumed_numbers
 from ...model import model_file
-from ...model.axes_samples import has_several_drives
+from ...model.axes_samples import has_several_axes
 from ...report.json_file import write_json
 from ...report.tables.parameter_table import correlation_table, parameter_table
 from ...report.tables.table import Table
@@ -58,6 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         const=PublishedBoucWen.name,
         help="Bouc-Wen in the discrete form of the paper, Eq. (7)",
     )
+    parser.set_defaults(hysteresis=None)
     parser.add_argument(
         "--no-memory",
         action="store_true",
@@ -83,14 +84,15 @@ def run(args: argparse.Namespace) -> int:
     """
     require_new_results(args)
     experiment = reading_options.read(args)
-    if has_several_drives(experiment):
+    if has_several_axes(experiment):
         return several_axes.identify(experiment, args)
+    model_file.require_name(args.output)
     orders = None if args.choose_orders else tuple(args.orders or (8, 8))
     with progress("identify", usual_time(experiment.size, "2 s", 1)) as report_progress:
         found = identify(
             experiment,
             orders=orders,
-            hysteresis=OPERATORS[args.hysteresis],
+            hysteresis=OPERATORS[args.hysteresis or HYSTERESIS.name],
             memory=not args.no_memory,
             held_out=HELD_OUT if args.held_out is None else tuple(args.held_out),
             progress=report_progress,

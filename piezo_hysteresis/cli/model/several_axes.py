@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`piezo identify` and `piezo validate` for records of several drive voltages."""
+"""`piezo identify` and `piezo validate` for records of several axes."""
 
 from __future__ import annotations
 
@@ -20,14 +20,16 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...errors import IdentificationError, ModelError
+from ...errors import IdentificationError, ModelError, ParameterError
 from ...identification.identify_axes import LENGTH, AxisError, axes_errors, identify_axes
 from ...identification.records.roles import HELD_OUT
 from ...model import axes_file
+from ...model.axes_samples import names
 from ...record import Experiment, Record
 from ...report.json_file import write_json
 from ...report.tables.table import Table
 from ...report.words import describes, error_sentence
+from ..options.destination import require_new_file
 from ..terminal import console, show, show_notices
 
 
@@ -37,11 +39,27 @@ def identify(experiment: Experiment, args: argparse.Namespace) -> int:
     Raises
     ------
     PiezoError
-        On an output that does not end in .npz, or data that do not determine the model.
+        On an output that does not end in .npz, an option for one axis, or data that do not determine the model.
     """
-    path = Path("model.npz" if args.output == "model.yaml" else args.output)
+    path = Path("model.npz" if args.output == "model.yaml" else args.output).expanduser()
+    require_new_file("-o", str(path), args.force)
+    first = experiment[0]
+    channels = ", ".join((*names(first, "voltage"), *names(first, "displacement")))
     if path.suffix != ".npz":
-        raise ModelError(f"{path}: a model of several axes is an NPZ file; give -o a name that ends in .npz")
+        raise ModelError(
+            f"{path}: a model of several axes ({channels}) is an NPZ file; give -o a name that ends in .npz"
+        )
+    for option, is_given in (
+        ("--hysteresis or --published", args.hysteresis is not None),
+        ("--orders", args.orders is not None),
+        ("--choose-orders", args.choose_orders),
+        ("--no-memory", args.no_memory),
+    ):
+        if is_given:
+            raise ParameterError(
+                f"{option}: got records of several axes ({channels}), expected one axis; leave the option out, because "
+                "a model of several axes always has responses of --taps samples and a set of plays"
+            )
     judges = experiment.named(*(HELD_OUT if args.held_out is None else args.held_out))
     fitted = [record for record in experiment if record not in judges]
     if not fitted:

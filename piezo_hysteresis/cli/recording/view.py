@@ -24,6 +24,7 @@ import webbrowser
 from contextlib import suppress
 from pathlib import Path
 
+from ...identification.records.one_axis import one_axis
 from ...model import model_file
 from ...report.figures.comparison import ModelComparison, compare
 from ..options import destination, reading_options
@@ -53,6 +54,8 @@ def run(args: argparse.Namespace) -> int:
     destination.require_new_file("--rerun", args.rerun, args.force)
     models = {} if args.model is None else {Path(args.model).stem: model_file.load(args.model)}
     experiment = reading_options.read(args, rows_before=0)
+    if models:
+        experiment = experiment.noting(*one_axis(experiment))
     comparison = compare(experiment, models)
     title = f"Recording {', '.join(Path(path).name for path in args.experiment)}"
     if args.rerun is not None:

@@ -19,6 +19,7 @@ from __future__ import annotations
 from ...record import Experiment, Notice
 from .conditioning_split import known_from_within
 from .noise import without_voltage_noise
+from .one_axis import one_axis
 
 
 def comparable(experiment: Experiment) -> tuple[Experiment, tuple[Notice, ...]]:
@@ -34,8 +35,14 @@ def comparable(experiment: Experiment) -> tuple[Experiment, tuple[Notice, ...]]:
     experiment : Experiment
         Experiment with the same samples of displacement.
     notices : tuple of Notice
-        Those of `known_from_within` and of `without_voltage_noise`.
+        Those of `one_axis`, of `known_from_within` and of `without_voltage_noise`.
+
+    Raises
+    ------
+    RecordError
+        If a record has several drives.
     """
+    axes = one_axis(experiment)
     known, conditioned = known_from_within(experiment)
     quiet, noise = without_voltage_noise(known)
-    return quiet, (*conditioned, *noise)
+    return quiet, (*axes, *conditioned, *noise)
