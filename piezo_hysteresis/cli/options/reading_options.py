@@ -58,7 +58,8 @@ def add_reading_group(parser: argparse.ArgumentParser) -> None:
         metavar="CHANNEL=PLACE",
         action="append",
         default=[],
-        help="column of a channel: its number from 1, its name, or /topic.field; e.g. displacement=5 (repeatable)",
+        help="column of a channel: its number from 1, its name, data[2] in a matrix, or /topic.field; e.g. "
+        "displacement=5 (repeatable)",
     )
     group.add_argument(
         "--unit",
