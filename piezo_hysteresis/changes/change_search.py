@@ -197,12 +197,11 @@ class ChangeSearch:
     def of_equal_records(self, account: Account, floors: Sequence[float]) -> float:
         """V that an account without change leaves, with equal weights of the records; `floors` of the used records [m].
 
-        A model states its error with these weights. Gain and loop height count as in the cost of the account.
+        A model states its error with these weights.
         """
         left = self._left(account, np.ones(self.measured.size))
         power = np.add.reduceat(left**2, np.cumsum([0, *self.sizes[:-1]])) / self.sizes
-        moved = sum((account.own[n] / DAY_TO_DAY[n]) ** 2 for n in self.sides)
-        return float(np.mean(power) / np.mean(np.square(floors)) + PENALTY * moved)
+        return float(np.mean(power) / np.mean(np.square(floors)))
 
     def shaped(
         self,

@@ -39,7 +39,7 @@ from .signatures import AVERAGE, SECOND_ORDER, SHAPES, shaped_model
 Array = NDArray[np.float64]
 
 UNCHANGED = ADEQUATE**0.5
-"""Largest ratio of the error to the known one for which nothing has changed visibly: the one criterion for it."""
+"""Largest ratio of the error to the known one for which nothing has changed visibly."""
 EXPLAINS = 0.7
 """Largest share of V that a change may leave, relative to V with fitted gain, loop height and zero."""
 NEARLY_ALL, NEARLY_ALL_OF_A_SHAPE = 0.08, 0.01
@@ -88,7 +88,7 @@ def find_change(
     """
     search = ChangeSearch(model, records, used, floors)
     day = search.account("none")
-    if _error_ratio(search, day, floors) <= UNCHANGED:
+    if _error_ratio(search, day, floors) ** 2 + day.cost - day.left <= ADEQUATE:
         return None
     keys = [k for k, kind in KINDS.items() if k in SHAPES or (kind.rows and kind.rows[0] in search.predicted[0].rows)]
     first = [k for k in (*search.sides, *keys) if k not in (*SECOND_ORDER, "low_pass_before")]

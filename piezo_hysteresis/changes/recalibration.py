@@ -40,7 +40,7 @@ from ..identification.records.noise import without_voltage_noise
 from ..identification.records.noise_floor import floors, stroke
 from ..identification.records.one_axis import one_axis
 from ..model.model import Model
-from ..model.provenance import LARGEST, MOVING, known_error, provenance, record_errors
+from ..model.provenance import LARGEST, MOVING, known_error, with_origin
 from ..record import CONDITIONING, Experiment, Notice, Record
 from .change_kinds import ParameterChange
 from .change_search import AROUND, Account, ChangeSearch
@@ -167,10 +167,9 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     new, by_new = (fitted, single[1]) if kept else (zeroed(model), single[0])
     span = stroke(records)
     rms = min(before, after)
-    origin = {**provenance(experiment, rms, 100.0 * rms / span), **record_errors(float(by_new.max()), rms)}
     stated = known_error(model, LARGEST)
     return Recalibration(
-        replace(new, provenance={**model.provenance, **origin}),
+        with_origin(new, experiment, 100.0 * rms / span, float(by_new.max()), rms),
         best.own["gain"] if kept else 0.0,
         search.stated("loop", best.own.get("loop", 0.0)) if kept else 0.0,
         best.size if kept else 0.0,

@@ -25,7 +25,6 @@ from ..identification.fit.fit import Fit, Progress
 from ..identification.fit.form_uncertainty import with_form_uncertainty
 from ..identification.records.excitation_check import missing_excitation
 from ..model.model import Model
-from ..model.provenance import with_stated_error
 from ..record import Experiment
 from .choice.next_experiment import best_next_experiment
 from .diagnosis import Diagnosis
@@ -106,33 +105,33 @@ def concluded(
     missing = missing_excitation([setup.records[i] for i in setup.usable], found)
     models = first.stated_model if given is None else given, delivered
     noted, said = experiment.noting(*missing), (conclusion, reason)
-    answer = answered(noted, said, models, fit, gap, setup.span, selection, setup.training_data, where)
-    return replace(answer, correction=best_correction(final.model, setup)) if is_unexplained else answer
+    answer = answered(noted, said, models, given, fit, gap, selection, setup.training_data, where)
+    return replace(answer, correction=best_correction(final.model, setup, experiment)) if is_unexplained else answer
 
 
 def answered(
     experiment: Experiment,
     said: tuple[Conclusion, str],
     models: tuple[Model, Model],
+    given: Model | None,
     fit: Fit | None,
     gap: Gap,
-    span: float,
     selection: Selection,
     training_data: TrainingData,
     where: tuple[ResidualShare, ...],
 ) -> Diagnosis:
     """The answer of a search, with the next experiment.
 
-    `said` is the conclusion and its reason. The models before and after state their own errors, in a range of `span`
-    [m]: the second one that of live prediction.
+    `said` is the conclusion and its reason. The model after states this experiment as its origin, and its errors on it,
+    unless it is the `given` one.
     """
     conclusion, reason = said
     before, after = models
     return Diagnosis(
         conclusion=conclusion,
         reason=reason,
-        model=with_stated_error(after, gap.live, span),
-        baseline=with_stated_error(before, gap.before, span),
+        model=after if after is given else gap.stated_by(after, experiment),
+        baseline=before,
         selection=selection,
         fit=fit,
         where=where,

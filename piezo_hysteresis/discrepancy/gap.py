@@ -27,9 +27,11 @@ from ..blocks.block import Array
 from ..effects import MainsHum
 from ..identification.fit.normal_equations import Nuisance
 from ..identification.free_run_error import free_per_record, residuals_on
+from ..identification.records.excitation_check import moves
 from ..identification.records.noise_floor import ADEQUATE
 from ..model.model import Model
-from ..record import Record
+from ..model.provenance import with_origin
+from ..record import Experiment, Record
 from .search.selection_result import explained
 
 FALLS = 0.9
@@ -88,6 +90,14 @@ class Gap:
     def explained(self) -> float:
         """Share X of the gap that the extended model explains: 1 − √((V_after − 1)/(V_before − 1)), between 0 and 1."""
         return explained(*self._squares, 1.0)
+
+    def stated_by(self, model: Model, experiment: Experiment) -> Model:
+        """The extended model with the experiment as its origin, and with its errors on these records."""
+        after = [p.after for p in self.per_phase]
+        moving = [p.after for p in self.per_phase if moves(experiment[p.index])]
+        mean = float(np.sqrt(np.mean(np.square(moving or after))))
+        errors = (0.01 * experiment.range * max(error, self.live) for error in (max(after), mean))
+        return with_origin(model, experiment, self.live, *errors)
 
     @property
     def _squares(self) -> tuple[float, float]:

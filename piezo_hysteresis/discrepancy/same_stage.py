@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,8 +28,8 @@ from ..errors import DivergenceError, ModelError, ParameterError
 from ..identification.records.comparable import comparable
 from ..identification.records.noise_floor import floors, noise_floors, stroke
 from ..model.model import Model
-from ..model.provenance import MOVING, data_hash, known_error, with_stated_error
-from ..record import Experiment, Notice
+from ..model.provenance import LARGEST, MOVING, data_hash, known_error, record_errors
+from ..record import Experiment, Notice, Record
 from .diagnosis import Diagnosis
 from .gap import measure_gap
 from .localise import located
@@ -79,19 +80,9 @@ def same_stage(
     known = known_error(model, MOVING)
     limits = np.maximum(least, known).tolist()
     try:
-        ratio = error_ratio(model, records, used, limits) if known else np.inf
-        if ratio <= UNCHANGED:
-            return Notice(
-                UNCHANGED_STAGE,
-                "no change beyond the known error is visible since the model was identified: apart from its zero, gain "
-                f"and loop height, which differ from day to day, its error is within the known {1e9 * known:.3g} nm "
-                f"({100.0 * known / stroke(records):.3g} % of the range); a smaller change may be hidden in it",
-            )
         change = find_change(model, records, used, limits, progress)
         if change is None:
-            said = f"apart from its zero, gain and loop height, the given model has {ratio:.2g} times its known error"
-            cause = "something has changed, or these drives show an error that it always had"
-            return Notice("grown_error", f"{said}: {cause}") if known else None
+            return _without_change(model, records, used, limits) if known else None
         changed = changed_model(model, change, records)
         where = located(model, records, used, least.tolist(), offset=True)
         both, span = (model, changed), stroke(records)
@@ -103,7 +94,7 @@ def same_stage(
     return Diagnosis(
         conclusion=Conclusion.CHANGED_PARAMETER,
         reason=sentence_of(change),
-        model=with_stated_error(changed, gap.live, stroke(records)),
+        model=_stated(model, gap.stated_by(changed, experiment)),
         baseline=model,
         selection=None,
         fit=None,
@@ -113,3 +104,25 @@ def same_stage(
         experiment=experiment,
         change=change,
     )
+
+
+def _without_change(model: Model, records: Sequence[Record], used: Sequence[int], limits: Sequence[float]) -> Notice:
+    """What is known if no changed parameter explains the records: the error has grown, or no change is visible."""
+    ratio, known = error_ratio(model, records, used, limits), known_error(model, MOVING)
+    apart = "apart from its zero, gain and loop height"
+    if ratio > UNCHANGED:
+        said = f"{apart}, the given model has {ratio:.2g} times its known error"
+        return Notice("grown_error", f"{said}: something has changed, or these drives show an error that it always had")
+    percent = 100.0 * known / stroke(records)
+    return Notice(
+        UNCHANGED_STAGE,
+        f"no change beyond the known error is visible since the model was identified: {apart}, which differ from day "
+        f"to day, its error is within the known {1e9 * known:.3g} nm ({percent:.3g} % of the range); a smaller change "
+        "may be hidden in it",
+    )
+
+
+def _stated(before: Model, after: Model) -> Model:
+    """The changed model; where its few numbers made it better than before, it may be so on these records only."""
+    largest, moving = (max(known_error(model, key) for model in (before, after)) for key in (LARGEST, MOVING))
+    return replace(after, provenance={**after.provenance, **record_errors(largest, moving)})

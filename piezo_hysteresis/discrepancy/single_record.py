@@ -36,7 +36,6 @@ from ..identification.records.sampling import shortened
 from ..identification.structure.left_out import has_several_drives, score_left_out
 from ..identification.structure.structure_choice import LEADS
 from ..model.model import Model
-from ..model.provenance import provenance
 from ..record import Notice, Record
 from .conclusion import answered
 from .diagnosis import Diagnosis
@@ -133,9 +132,7 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     shown = {s.best.effect.public_name() for s in selection.accepted}
     missing = missing_excitation([records[i] for i in used], shown)
     said = conclusion_of_few(selection, is_certain, before, gap, len(used), several, missing)
-    delivered = replace(final.model, provenance={**final.model.provenance, **provenance(experiment, 0.0, 0.0)})
-    noted, both = experiment.noting(*missing), (first, delivered)
-    return answered(noted, said, both, final.fit, gap, span, selection, training_data, where)
+    return answered(experiment.noting(*missing), said, both, model, final.fit, gap, selection, training_data, where)
 
 
 def _best(

@@ -60,22 +60,27 @@ def provenance(experiment: Experiment, error: float, percent: float) -> Mapping[
         "source": experiment.source,
         "date": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
         "data_hash": data_hash(experiment),
-        **free_run(error, percent),
-    }
-
-
-def free_run(error: float, percent: float) -> Mapping[str, str]:
-    """The free-run error alone, in metres and in per cent of the displacement range."""
-    return {
         "free_run_error": repr(float(f"{error:.6g}")),
         "free_run_error_percent": repr(float(f"{percent:.6g}")),
     }
 
 
-def with_stated_error(model: Model, percent: float, stroke: float) -> Model:
-    """The model with its free-run error in the provenance; `percent` is in % of the `stroke` [m]."""
-    origin = {key: text for key, text in model.provenance.items() if key not in (LARGEST, MOVING)}  # of others
-    return replace(model, provenance={**origin, **free_run(0.01 * percent * stroke, percent)})
+def with_origin(model: Model, experiment: Experiment, percent: float, largest: float, moving: float) -> Model:
+    """The model with the origin of its values and its errors in the provenance; what else it states stays.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    experiment : Experiment
+        What was fitted.
+    percent : float
+        Free-run error in % of the range of the experiment.
+    largest, moving : float
+        Largest error of a record, and that over the records in which the drive moves [m].
+    """
+    origin = provenance(experiment, 0.01 * percent * experiment.range, percent)
+    return replace(model, provenance={**model.provenance, **origin, **record_errors(largest, moving)})
 
 
 def data_hash(experiment: Experiment) -> str:

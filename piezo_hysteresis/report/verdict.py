@@ -163,9 +163,10 @@ def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
     if gap.get("after") is not None:
         seen = "On the test records" if gap.get("unseen", True) else "On the fitted data"
         after = "after" if answer.get("effects") else "with the model that was fitted to these data"
+        fell = "" if gap["after"] == gap["before"] else f" before and {gap['after']:.3g} % {after}"
         found.append(
-            f"{seen} the gap (free-run error) is {gap['before']:.3g} % of the range before and {gap['after']:.3g} % "
-            f"{after}; the noise floor is {gap['floor']:.3g} %."
+            f"{seen} the gap (free-run error) is {gap['before']:.3g} % of the range{fell}; the noise floor is "
+            f"{gap['floor']:.3g} %."
         )
     correction = answer.get("unnamed_correction")
     if correction:

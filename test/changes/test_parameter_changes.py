@@ -213,6 +213,29 @@ def test_diagnose_says_that_nothing_has_changed(model, another_day):
     assert later.conclusion is Conclusion.CHANGED_PARAMETER
 
 
+@pytest.mark.parametrize("changed", [{"gain": 1.012}, {"gain": 0.987}, {"loop": 0.95}], ids=str)
+def test_gain_and_loop_height_of_another_day_are_no_larger_error(model, changed):
+    """The sentence about the error counts it apart from its zero, gain and loop height."""
+    factors = {name: factor * getattr(STAGE, name) for name, factor in changed.items()}
+    found = diagnose(played(replace(STAGE, noise_seed=1, **factors)), model, effects=())
+    assert found.conclusion is Conclusion.NOTHING_CHANGED
+    assert all(n.kind != "grown_error" for n in found.experiment.notices)
+
+
+def test_a_model_that_was_not_fitted_again_keeps_what_it_states(model):
+    """Otherwise the next diagnosis takes the error on a few test records for the known one, and finds a change."""
+    found = diagnose(played(replace(STAGE, noise_seed=1)), model, effects=())
+    assert found.model.values() == model.values()
+    assert found.model.provenance == model.provenance
+
+
+def test_a_model_that_was_fitted_again_states_the_new_records(model, another_day):
+    records = played(replace(another_day, filter_pole=2e-3))
+    new, old = diagnose(records, model).model.provenance, model.provenance
+    assert new["data_hash"] == data_hash(records) != old["data_hash"]
+    assert all(float(new[key]) >= float(old[key]) for key in ("largest_record_error", "moving_record_error"))
+
+
 @pytest.mark.parametrize("known", [False, True])
 def test_the_data_of_a_model_are_recognised_if_the_voltage_was_measured(model, known):
     """The noise of the voltage is removed first, but the model states the hash of the data as recorded."""

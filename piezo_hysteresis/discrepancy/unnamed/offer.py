@@ -25,7 +25,7 @@ from ...blocks.block import Array
 from ...effects import Creep, Offset, UnnamedCorrection, UnnamedPlays, UnnamedPositionMap, UnnamedRelaxation
 from ...identification.identified_range import identified_range
 from ...model.model import Model
-from ...model.provenance import with_stated_error
+from ...record import Experiment
 from ..gap import measure_gap
 from ..search.baseline_setup import BaselineSetup
 from ..search.candidate_refits import LEAST_GAIN
@@ -46,7 +46,7 @@ FEW = 10
 """Number of linearisations of a trial; few, because a correction is small and linear in its parameters."""
 
 
-def best_correction(model: Model, setup: BaselineSetup) -> Correction | None:
+def best_correction(model: Model, setup: BaselineSetup, experiment: Experiment) -> Correction | None:
     """The best correction of a fitted model, with the results of its tests.
 
     Parameters
@@ -55,6 +55,8 @@ def best_correction(model: Model, setup: BaselineSetup) -> Correction | None:
         Fitted model, whose residual no effect explains.
     setup : BaselineSetup
         Records and floors.
+    experiment : Experiment
+        The records as they came.
 
     Returns
     -------
@@ -72,7 +74,7 @@ def best_correction(model: Model, setup: BaselineSetup) -> Correction | None:
     if not found:
         return None
     best = max(found, key=lambda c: min(c.gain_rate, c.gain_amplitude))
-    return best if best.refusal else judged_on_test_records(best, model, setup)
+    return best if best.refusal else judged_on_test_records(best, model, setup, experiment)
 
 
 def forms(model: Model, training_data: TrainingData) -> Iterator[UnnamedCorrection]:
@@ -123,7 +125,9 @@ def fitted_correction(
     return Correction(effect, model.displacement_scale, None, by_rate, by_amplitude, None, 0.0, refusal)
 
 
-def judged_on_test_records(correction: Correction, model: Model, setup: BaselineSetup) -> Correction:
+def judged_on_test_records(
+    correction: Correction, model: Model, setup: BaselineSetup, experiment: Experiment
+) -> Correction:
     """The correction after the last fit to all samples, judged on the test records."""
     training_data, _ = setup.for_last_fit()
     try:
@@ -145,7 +149,7 @@ def judged_on_test_records(correction: Correction, model: Model, setup: Baseline
         most = f"at most {100 * (WORSE - 1.0):.0f} % is allowed"
         refusal = f"it increases the error of a test record by {100 * (found.worst - 1.0):.0f} %, and {most}"
         return replace(found, refusal=refusal)
-    stated = with_stated_error(fit.stated_model, gap.live, setup.span)
+    stated = gap.stated_by(fit.stated_model, experiment)
     envelope = identified_range(setup.records, setup.fitted)
     return replace(found, model=replace(stated, provenance={**stated.provenance, **envelope}))
 

@@ -116,7 +116,7 @@ def of_friction() -> BaselineSetup:
 
 @pytest.fixture(scope="module")
 def found(of_position: BaselineSetup) -> Correction:
-    return best_correction(of_position.baseline.model, of_position)
+    return best_correction(of_position.baseline.model, of_position, Experiment(of_position.given))
 
 
 def test_plays_that_never_move_leave_the_errors_as_they_are(of_position: BaselineSetup) -> None:
@@ -152,7 +152,7 @@ def test_a_correction_is_zero_outside_the_recorded_positions() -> None:
 
 
 def test_friction_of_the_position_is_offered_as_plays(of_friction: BaselineSetup) -> None:
-    found = best_correction(of_friction.baseline.model, of_friction)
+    found = best_correction(of_friction.baseline.model, of_friction, Experiment(of_friction.given))
     assert found.accepted and isinstance(found.effect, UnnamedPlays)
     assert found.removed >= 0.5 and found.worst <= 1.05
 
@@ -188,4 +188,5 @@ def test_a_correction_is_never_part_of_naming(monkeypatch: pytest.MonkeyPatch) -
 def test_records_of_one_rate_cannot_accept_a_correction(of_position: BaselineSetup) -> None:
     data = of_position.training_data
     one = replace(data, records=data.records[3:6], floors=data.floors[3:6], alone=())
-    assert best_correction(of_position.baseline.model, replace(of_position, training_data=one)) is None
+    alone = replace(of_position, training_data=one)
+    assert best_correction(of_position.baseline.model, alone, Experiment(alone.given)) is None
