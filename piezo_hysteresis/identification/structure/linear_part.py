@@ -29,7 +29,7 @@ from .pole_place import LinearPart, in_every_place, real_poles, with_pole
 from .ringing import decay_after_steps, ringing_lines, sampled_decay
 from .step_edge import with_slew_limit
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
-from .structure_fit import SETTLED, fit_structure, is_settled, misfit_of
+from .structure_fit import SETTLED, fit_from_best, fit_structure, is_settled, misfit_of
 
 LAGS = (0.3, 1.5, 4.0)
 """Start values of the delay [samples]."""
@@ -48,6 +48,8 @@ SECOND = 0.5
 """Beside a ringing mode, dynamics of second order or a second mode are accepted if at most this share of the power
 after a step remains; without one, `DESCRIBED` counts. So is a largest slope of the drive, and it must leave at most
 this share of the cost, too: a slope that the first samples just show takes the place of a lag."""
+SHOWN = 0.9
+"""Largest share of the power after a step that a slope of the drive leaves if the steps show it without any pole."""
 POLE_GAINS = 0.98
 """A pole is accepted if at most this share of the cost remains."""
 RESOLVES = 0.005
@@ -69,8 +71,7 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
         Floor of every record [m].
     """
     lags = (*LAGS, *_late_responses(pieces))
-    found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in lags]
-    plain = min(found, key=lambda f: f.cost)
+    plain = fit_from_best([model.with_values({DELAY: lag}) for lag in lags], pieces, floors)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
     start, late = best, with_slew_limit(best, pieces, floors)
     if not is_settled(best, pieces):
@@ -146,24 +147,22 @@ def _behind_slew_limit(
 ) -> tuple[PieceFit, float]:
     """The fit with a largest slope of the drive, and the lead of a ringing mode; `late` has poles and mode already.
 
-    Poles and mode that describe a slow edge hide the slope, so it is fitted before them. From one slow rate, some
-    slopes are found only after them.
+    Poles and mode that describe a slow edge hide the slope, so it is fitted before them, too, if the steps show it
+    then. From one slow rate, some slopes are found only after them.
     """
-    early = _with_poles_and_mode(with_slew_limit(plain, pieces, floors), pieces, floors)
+    early, its_lead = with_slew_limit(plain, pieces, floors), 0.0
+    if _after_steps(early, pieces) < SHOWN * _after_steps(plain, pieces):
+        early, its_lead = _with_poles_and_mode(early, pieces, floors)
     ringing = late if ExtraResonance.name in late.model else with_mode(late, pieces, floors)
     whole = ringing if real_poles(ringing.model) else _with_pole(ringing, pieces, floors)
-    return min(early, (whole, lead if ringing is late else _lead(late, ringing)), key=lambda found: found[0].cost)
+    after = whole, lead if ringing is late else _lead(late, ringing)
+    return min((early, its_lead), after, key=lambda found: found[0].cost)
 
 
 def _with_pole(start: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
     """The fit with a pole, if it lowers the cost by enough."""
-    held, poles = held_by(start), []
-    for pole in START_POLES:
-        tried = fit_structure(with_pole(start.model, pole), pieces, floors, held)
-        if real_poles(tried.model):
-            poles.append(tried)
-    lagging = min(poles, key=lambda f: f.cost, default=start)
-    return lagging if lagging.cost < POLE_GAINS * start.cost else start
+    lagging = fit_from_best([with_pole(start.model, pole) for pole in START_POLES], pieces, floors, held_by(start))
+    return lagging if real_poles(lagging.model) and lagging.cost < POLE_GAINS * start.cost else start
 
 
 def _with_second_order(start: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
