@@ -14,6 +14,8 @@
 
 """Steps that are sampled more slowly than the stage rings: they show the lag, and do not spoil loop and creep."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,13 @@ def test_a_mode_above_half_the_sampling_rate_does_not_change_lag_loop_and_creep(
         assert np.std(error) < 3e-3 * np.ptp(other.displacement), frequency
     creep = model.values()
     assert creep.get("creep.gamma", creep.get("creep_two_rates.gamma_slow")) > 0.002
+
+
+def test_a_mode_above_half_the_sampling_rate_is_told_beside_the_one_that_rings_alike():
+    stage = Nanopositioner(mode=700.0, zeta=0.01)
+    played = tuple(stage.play(growing_sine(f, 1e-3, (0.4, 1.0)), 1e-3) for f in (1.0, 40.0))
+    (said,) = (n.message for n in identify(Experiment(played), memory=True).notices if n.kind == "ringing")
+    assert float(re.search(r"a mode at ([0-9.]+) Hz would ring alike", said)[1]) == pytest.approx(700.0, abs=1.0)
 
 
 @pytest.mark.parametrize(

@@ -45,6 +45,8 @@ A fit that ends with more describes a lag, for which there is a delay and a pole
 """
 SILENT_DAMPING = 0.2
 """Damping ratio assumed for a mode that does not ring; its lag is part of the delay."""
+FARTHEST_ALIAS = 4.0
+"""Largest ratio of the frequency of a mode that rings alike in the samples to that of the mode, if it is told."""
 WHOLE = 0.3
 """Largest deviation from 1 of the share of a mode of the whole stage; with another share it may be an alias."""
 SHAPE, SHARE = tuple(f"{ExtraResonance.name}.{n}" for n in ("f0", "zeta")), f"{ExtraResonance.name}.r"
@@ -133,6 +135,9 @@ def mode_notices(fit: PieceFit) -> list[Notice]:
         for pole in (p for p in rings if p.imag > 0.0):  # a negative pole is none of a mode that the samples show
             frequency = abs(np.log(pole)) / (2.0 * np.pi * fit.model.sample_period)
             said += f", and one at {frequency:.4g} Hz in the ARX dynamics with {_damping(pole):.2g}"
+        alias = 1.0 / fit.model.sample_period - mode["f0"]
+        if alias < FARTHEST_ALIAS * mode["f0"]:
+            said += f"; a mode at {alias:.4g} Hz would ring alike in samples every {fit.model.sample_period:.3g} s"
     else:
         said = (
             f"the gain changes with the frequency of the drive; {shown} a share of {mode['r']:.3g} stands for this, "
