@@ -136,7 +136,7 @@ def _behind_anew(
     While an effect is missing, iterations that improve the fit of the broadband records may worsen that of the others.
     """
     check_time()
-    broadband = training_data.broadband()
+    broadband = training_data.broadband
     if not broadband:
         return None
     found, best = list[Fitted](), None
@@ -180,7 +180,7 @@ def without(candidate: FittedCandidate) -> Fitted | None:
 
 def _absorbed(model: Model, extended: Model, training_data: TrainingData) -> Model | None:
     """The model with dynamics that imitate `extended`, which has one more linear effect; None if there are none."""
-    broadband = training_data.broadband()
+    broadband = training_data.broadband
     if not broadband:
         return None
     inputs = hysteresis_signals(model, training_data.records, broadband)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -40,7 +41,7 @@ MOVES = 30.0
 """Power over noise from which the spectrum of the displacement counts as motion."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class TrainingData:
     """Records for fitting and choosing, with their floors.
 
@@ -86,6 +87,7 @@ class TrainingData:
         """The disturbances that are free in every record for a model."""
         return free_per_record(model, offset=self.offset)
 
+    @cached_property
     def broadband(self) -> list[int]:
         """Records whose drive determines linear dynamics."""
         return [

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from ..steps.linear_start import dynamics_of
 from .piece_fit import DELAY, PieceFit
 from .pieces import Kind, RecordPiece
 from .ringing import RESOLVED, SAME_LINE, SLOWEST, ringing_lines
-from .structure_fit import fit_structure, misfit_of
+from .structure_fit import FEW, fit_structure, misfit_of
 
 RINGING_STAYS = 0.7
 """A mode is accepted if at most this share of the power in pieces of the kind that rings remains."""
@@ -65,27 +65,27 @@ def with_mode(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[f
         if described and stays and rings.cost < found.cost:
             found = rings
     if found is plain or abs(found.model.values()[SHARE] - 1.0) > WHOLE:
-        silent = min(_silent(plain, pieces, floors), key=lambda f: f.cost, default=plain)
+        silent = _silent(plain, pieces, floors)
         if silent.cost < SILENT_GAINS * found.cost:
             found = silent
     return found
 
 
-def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> Iterator[PieceFit]:
-    """Fits with a mode that no step shows; each adjusts either its frequency, or its share at the highest frequency."""
+def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
+    """The fit with a mode that no step shows: either its frequency, or its share at the highest one, is adjusted."""
     if len({p.rate for p in pieces if p.kind is Kind.LOOP}) < 2:
-        return  # at one rate, the gain cannot rise with frequency
+        return plain  # at one rate, the gain cannot rise with frequency
     loops = [p.record for p in pieces if p.kind is Kind.LOOP]
     fastest = max((excitation_content(r).bandwidth for r in loops), default=0.0)
     top = RESOLVED / min(p.record.sample_period for p in pieces)
-    for times in SILENT:
-        if SLOWEST < times * fastest < top:
-            mode = ExtraResonance(r=1.0, f0=times * fastest, zeta=SILENT_DAMPING)
-            yield fit_structure(plain.model.with_effect(mode), pieces, floors, (SHARE, SHAPE[1]))
     if top <= SLOWEST:
-        return
-    mode = ExtraResonance(r=0.5, f0=top, zeta=SILENT_DAMPING)
-    yield fit_structure(plain.model.with_effect(mode), pieces, floors, SHAPE)
+        return plain
+    slower = [f for f in (times * fastest for times in SILENT) if SLOWEST < f < top]
+    starts = [(ExtraResonance(r=1.0, f0=f, zeta=SILENT_DAMPING), (SHARE, SHAPE[1])) for f in slower]
+    starts.append((ExtraResonance(r=0.5, f0=top, zeta=SILENT_DAMPING), SHAPE))
+    begun = [fit_structure(plain.model.with_effect(mode), pieces, floors, held, FEW) for mode, held in starts]
+    best = min(begun, key=lambda f: f.cost)
+    return fit_structure(best.model, pieces, floors, held_by(best))
 
 
 def held_by(fit: PieceFit) -> tuple[str, ...]:
