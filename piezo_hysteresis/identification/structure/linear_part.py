@@ -48,8 +48,8 @@ SECOND = 0.5
 """Beside a ringing mode, dynamics of second order or a second mode are accepted if at most this share of the power
 after a step remains; without one, `DESCRIBED` counts. So is a largest slope of the drive, and it must leave at most
 this share of the cost, too: a slope that the first samples just show takes the place of a lag."""
-SHOWN = 0.9
-"""Largest share of the power after a step that a slope of the drive leaves if the steps show it without any pole."""
+SHOWN = 0.98
+"""Largest share of the power after a step that a slope of the drive leaves without any mode, if the steps show it."""
 POLE_GAINS = 0.98
 """A pole is accepted if at most this share of the cost remains."""
 RESOLVES = 0.005
@@ -161,8 +161,10 @@ def _behind_slew_limit(
 
 def _with_pole(start: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
     """The fit with a pole, if it lowers the cost by enough."""
-    lagging = fit_from_best([with_pole(start.model, pole) for pole in START_POLES], pieces, floors, held_by(start))
-    return lagging if real_poles(lagging.model) and lagging.cost < POLE_GAINS * start.cost else start
+    held = held_by(start)
+    found = [fit_structure(with_pole(start.model, pole), pieces, floors, held) for pole in START_POLES]
+    lagging = min((f for f in found if real_poles(f.model)), key=lambda f: f.cost, default=start)
+    return lagging if lagging.cost < POLE_GAINS * start.cost else start
 
 
 def _with_second_order(start: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
