@@ -102,7 +102,7 @@ def concluded(
                 gap = gap_of(given, given, tested, offset=True)
     is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
     found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
-    missing = missing_excitation([setup.records[i] for i in setup.usable], found)
+    missing = missing_excitation(setup.records, setup.usable, found)
     models = first.stated_model if given is None else given, delivered
     noted, said = experiment.noting(*missing), (conclusion, reason)
     answer = answered(noted, said, models, given, fit, gap, selection, setup.training_data, where)

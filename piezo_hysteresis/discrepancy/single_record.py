@@ -49,7 +49,7 @@ from .search.execution.time_limit import ending_at
 from .search.record_blocks import training_data_of
 from .search.refit import LAST, joint
 from .search.selection import select
-from .search.selection_result import Selection, Step, explained
+from .search.selection_result import Selection, Step
 from .search.structure_steps import structure_steps
 from .search.training_data import choose_test_records
 from .verdict import FEWEST_RECORDS, MORE_MAY_BE_MISSING, Conclusion, conclusion_of, is_explained
@@ -60,6 +60,15 @@ SEARCHED = 20_000
 """Number of samples of a slow record in the search."""
 EXTENDS = 0.1
 """Gain on rates, amplitudes and records left out (mean ln R²) from which an extended model is saved."""
+CHOSEN = (
+    "the saved model has the structure that predicts best in cross-validation; it explains {} of the gap of the "
+    "published model"
+)
+"""What is said of the saved model without a further effect, if no model was given."""
+REFITTED = "the saved model is the given one, fitted to these records; it explains {} of the gap of the given model"
+"""The same, if a refit of the given model is saved."""
+KEPT = "the given model is saved unchanged, because a fit to these records predicts what was left out hardly better"
+"""The same, if the given model is saved."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -130,8 +139,9 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     both = first, final.model
     gap = measure_gap(both, records, chosen, least.tolist(), span, unseen=bool(aside), offset=True)
     shown = {s.best.effect.public_name() for s in selection.accepted}
-    missing = missing_excitation([records[i] for i in used], shown)
-    said = conclusion_of_few(selection, is_certain, before, gap, len(used), several, missing)
+    missing = missing_excitation(records, used, shown)
+    origin = CHOSEN if found else REFITTED if final.fit is not None else KEPT
+    said = conclusion_of_few(selection, is_certain, before, gap, len(used), several, missing, origin)
     return answered(experiment.noting(*missing), said, both, model, final.fit, gap, selection, training_data, where)
 
 
@@ -159,23 +169,30 @@ def _best(
 
 
 def conclusion_of_few(
-    selection: Selection, decided: bool, before: Score, gap: Gap, count: int, several: bool, missing: Sequence[Notice]
+    selection: Selection,
+    decided: bool,
+    before: Score,
+    gap: Gap,
+    count: int,
+    several: bool,
+    missing: Sequence[Notice],
+    origin: str = CHOSEN,
 ) -> tuple[Conclusion, str]:
     """The conclusion and its reason.
 
     A small error of the extended model is no evidence that nothing is missing in the published one. One rate and one
-    amplitude can be explained by wrong effects.
+    amplitude can be explained by wrong effects. `origin` says which model is saved, if it contains no further effect.
     """
     named = gap.falls and (decided or (count >= FEWEST_RECORDS and several and is_explained(selection)))
     if not selection.in_time and not named:
         return conclusion_of(selection, named, gap.falls, gap)
-    closed = explained(before.excess, selection.score.excess, selection.null)
+    closed = f"{100 * gap.explained:.0f} %"
     names = [s.best.effect.public_name() for s in selection.accepted]
     if decided and named:
         rivals = [n for s in selection.accepted for n in s.confusable_with]
         said = (
             f"The model does not contain {' and '.join(names)}. An extended model predicts rates, amplitudes and "
-            f"records better that were left out of the fit; it explains {100 * closed:.0f} % of the gap."
+            f"records better that were left out of the fit; it explains {closed} of the gap."
         )
         alike = f" These data cannot distinguish {' or '.join(rivals)} from it." if rivals else ""
         return Conclusion.MISSING_EFFECT, said + alike + ("" if selection.in_time else MORE_MAY_BE_MISSING)
@@ -186,17 +203,15 @@ def conclusion_of_few(
         if is_adequate or conclusion is not Conclusion.NOTHING_MISSING:
             return conclusion, reason
     if is_adequate:
-        message = "the error of the published model is at the noise floor, so the data cannot show further effects"
+        which = "published model" if origin == CHOSEN else "given model, fitted to these records,"
+        message = f"the error of the {which} is at the noise floor, so the data cannot show further effects"
     elif names:
         message = (
-            f"the closest effect is {' with '.join(names)}, which explains {100 * closed:.0f} % of the "
-            "gap and was added to the model"
+            f"the closest effect is {' with '.join(names)}, which was added to the model; "
+            f"the saved model explains {closed} of the gap"
         )
     else:
-        message = (
-            "the saved model has the structure that predicts best in cross-validation; it explains "
-            f"{100 * closed:.0f} % of the gap of the published model"
-        )
+        message = origin.format(closed)
     records = ("one record" if count == 1 else f"{count} records") + ("" if several else " of one rate and amplitude")
     reason = "; ".join(
         (f"No effect is named, because {records} cannot distinguish effects", message, *(n.message for n in missing))

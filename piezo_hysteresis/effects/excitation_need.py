@@ -27,6 +27,6 @@ class ExcitationNeed(Enum):
     REPEATED_PHASE = auto()
     """The same kind of phase, recorded at two times."""
     SEVERAL_AMPLITUDES = auto()
-    """Slow loops of two or more amplitudes."""
+    """Loops of two or more amplitudes, from a slow drive or from sines or triangles."""
     BROADBAND = auto()
-    """Noise or a multisine, which excite the dynamics."""
+    """A step, noise or a multisine, which excite the dynamics."""

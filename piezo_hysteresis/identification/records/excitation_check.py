@@ -23,10 +23,12 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from ...effects import CATALOGUE, ExcitationNeed
+from ...effects import CATALOGUE, ExcitationNeed, ExtraDelay, ExtraResonance
 from ...errors import IdentificationError
 from ...record import Notice, Record
-from .excitation_content import SLOW, excitation_content
+from ..structure.pieces import Kind, pieces_of
+from .excitation_content import HELD, RINGS, SLOW, ExcitationContent, excitation_content
+from .steady_waves import SWING, find_turns
 
 HOLD = 1.0
 """Time for which a level must be held after a change, so that creep becomes visible [s]."""
@@ -35,39 +37,52 @@ MOVED = 0.02
 DISTINCT = 0.8
 """Ratio of the smaller to the larger amplitude below which two amplitudes count as different."""
 REASONS = {
-    ExcitationNeed.HELD_LEVEL: ((), "no level is held for a second or more after a change"),
-    ExcitationNeed.REPEATED_PHASE: ((), "no kind of phase was recorded twice"),
-    ExcitationNeed.SEVERAL_AMPLITUDES: ((), "all loops have the same amplitude"),
-    ExcitationNeed.BROADBAND: (("lags",), "no drive excites the dynamics (noise, multisine)"),
+    ExcitationNeed.HELD_LEVEL: "no level is held for a second or more after a change",
+    ExcitationNeed.REPEATED_PHASE: "no kind of phase was recorded twice",
+    ExcitationNeed.SEVERAL_AMPLITUDES: "there are no loops of several amplitudes",
+    ExcitationNeed.BROADBAND: "no drive excites the dynamics (step, noise, multisine)",
 }
-"""For each kind of drive: what it shows besides the effects that declare it, and the message if it is missing."""
+"""The message for each kind of drive that is missing."""
+SPARSE = "the samples after the steps are too far apart for ringing"
+"""The message if steps excite the dynamics, and the samples show no more than a lag."""
 
 
-def missing_excitation(records: Sequence[Record], found: Collection[str] = ()) -> tuple[Notice, ...]:
+def missing_excitation(
+    records: Sequence[Record], used: Collection[int], found: Collection[str] = ()
+) -> tuple[Notice, ...]:
     """One notice for every kind of drive that the records do not contain, with the effects that need it.
 
     Parameters
     ----------
     records : sequence of Record
-        Records that are used in the diagnosis.
+        The experiment, in order.
+    used : collection of int
+        Indices of the records that are used in the diagnosis.
     found : collection of str
         Public names of effects that the records have shown nevertheless; no notice names them.
     """
-    span = max(float(r.voltage.max()) for r in records) - min(float(r.voltage.min()) for r in records)
-    contents = [excitation_content(r) for r in records]
+    chosen = [records[i] for i in used]
+    span = max(float(r.voltage.max()) for r in chosen) - min(float(r.voltage.min()) for r in chosen)
+    contents = [excitation_content(r) for r in chosen]
     loops = [c.is_slow and c.bandwidth > 0.0 for c in contents]  # the bandwidth of a rest is 0
-    kinds = ["slow loops" if loop else r.phase.split("_")[0] for r, loop in zip(records, loops, strict=True)]
+    kinds = ["slow loops" if loop else r.phase.split("_")[0] for r, loop in zip(chosen, loops, strict=True)]
+    steps = [p.record.sample_period for p in pieces_of(records, used) if p.kind is Kind.STEP]
+    families = {e.family for e in CATALOGUE if e.public_name() in found}
+    rings = ExtraResonance.family in families or min(steps, default=np.inf) <= RINGS / HELD
     present = {
-        ExcitationNeed.HELD_LEVEL: any(_longest_hold(r, MOVED * span) >= HOLD for r in records),
+        ExcitationNeed.HELD_LEVEL: any(_longest_hold(r, MOVED * span) >= HOLD for r in chosen),
         ExcitationNeed.REPEATED_PHASE: len(set(kinds)) < len(kinds),
-        ExcitationNeed.SEVERAL_AMPLITUDES: _has_smaller_loops(records),
-        ExcitationNeed.BROADBAND: any(c.is_broadband for c in contents),
+        ExcitationNeed.SEVERAL_AMPLITUDES: _has_smaller_loops(chosen, contents),
+        ExcitationNeed.BROADBAND: rings or any(c.is_broadband for c in contents),
     }
     notices = []
     for need in (n for n, is_present in present.items() if not is_present):
-        others, reason = REASONS[need]
-        names = dict.fromkeys((*(e.public_name() for e in CATALOGUE if e.excitation_need is need), *others))
-        if hidden := " and ".join(name for name in names if name not in found):
+        names = [e.public_name() for e in CATALOGUE if e.excitation_need is need]
+        reason = REASONS[need]
+        if need is ExcitationNeed.BROADBAND:
+            reason = SPARSE if steps else reason
+            names += [] if steps or ExtraDelay.family in families else ["lags"]
+        if hidden := " and ".join(name for name in dict.fromkeys(names) if name not in found):
             notices.append(Notice("not_tested", f"these data can hardly show {hidden}, because {reason}"))
     return tuple(notices)
 
@@ -110,18 +125,16 @@ def _longest_hold(record: Record, least: float) -> float:
     return float(np.max((ends - starts)[changed], initial=0)) * record.sample_period
 
 
-def _has_smaller_loops(records: Sequence[Record]) -> bool:
-    """True if there are slow loops of two amplitudes, in one record or in two."""
+def _has_smaller_loops(records: Sequence[Record], contents: Sequence[ExcitationContent]) -> bool:
+    """True if there are loops of two amplitudes, in one record or in two: slow ones, or sines or triangles."""
     sizes: list[float] = []
-    for record in records:
+    for record, content in zip(records, contents, strict=True):
         u = record.voltage
-        steps = np.sign(np.diff(u))
-        moves = np.flatnonzero(steps)
-        if moves.size == 0:
-            continue
-        turns = moves[np.flatnonzero(np.diff(steps[moves])) + 1]
+        turns = np.empty(u.size, np.int64)
+        turns = turns[: find_turns(u, SWING * content.span, False, turns)]
         if turns.size < 2:  # a single loop begins and ends with the record
+            moves = np.flatnonzero(np.diff(u))
             turns = np.concatenate((moves[:1], turns, moves[-1:] + 1))
-        slow = np.diff(turns) * record.sample_period > 0.5 / SLOW
-        sizes += np.abs(np.diff(u[turns]))[slow].tolist()
+        counts = content.waves | (np.diff(turns) * record.sample_period > 0.5 / SLOW)
+        sizes += np.abs(np.diff(u[turns]))[counts].tolist()
     return bool(sizes) and min(sizes) < DISTINCT * max(sizes)
