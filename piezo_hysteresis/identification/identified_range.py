@@ -37,6 +37,8 @@ SLOWEST, FASTEST = "frequency_min", "frequency_max"
 """Keys of the provenance: slowest and fastest rate of the drive between its steps [Hz]."""
 STEEPEST = "slew_rate_max"
 """Key of the provenance: rate that is exceeded in 1 % of the moving samples [V/s]."""
+STEEPEST_STEP = "step_rate_max"
+"""Key of the provenance: largest rate between two samples, also that of a step [V/s]."""
 LAG_ERROR = "lag_uncertainty"
 """Key of the provenance: half of the 95 % interval of the lag [s]; absent if broadband records show the dynamics."""
 KEYS = (LOWEST, HIGHEST, SLOWEST, FASTEST, STEEPEST)
@@ -62,6 +64,7 @@ def identified_range(records: Sequence[Record], fitted: Collection[int]) -> Mapp
     fitted : collection of int
         Indices of the fitted records.
     """
+    before = _voltages_before(records)
     chosen = [records[i] for i in fitted]
     voltages = np.concatenate([np.append(r.voltage, r.settled_voltage) for r in chosen])
     moved = moving([_motion(r) for r in chosen])
@@ -71,6 +74,7 @@ def identified_range(records: Sequence[Record], fitted: Collection[int]) -> Mapp
         SLOWEST: min((m.slowest for m in moved if m.bandwidth > 0.0), default=0.0),
         FASTEST: max((m.bandwidth for m in moved), default=0.0),
         STEEPEST: max(_slew_rate(r) for r in chosen),
+        STEEPEST_STEP: max(_largest_step(records[i], before[i]) / records[i].sample_period for i in fitted),
     }
     return {key: repr(float(f"{number:.6g}")) for key, number in found.items()}
 
@@ -85,18 +89,22 @@ def outside(model: Model, experiment: Experiment) -> tuple[Notice, ...]:
     experiment : Experiment
         Experiment that is compared with the model.
     """
-    return tuple(notice for record in experiment for notice in outside_of(model, record))
+    pairs = zip(experiment, _voltages_before(experiment.records), strict=True)
+    return tuple(notice for record, before in pairs for notice in outside_of(model, record, before))
 
 
-def outside_of(model: Model, record: Record) -> Iterator[Notice]:
-    """`outside` of one record, or of a window of samples, including where a correction without a name is not valid."""
+def outside_of(model: Model, record: Record, before: float | None = None) -> Iterator[Notice]:
+    """`outside` of one record, or of a window of samples, including where a correction without a name is not valid.
+
+    `before` is the voltage before the first sample [V], by default the settled one.
+    """
     is_corrected = any(isinstance(e, UnnamedCorrection) for e in model.effects)
-    for notice in _outside_of(model, record):
+    for notice in _outside_of(model, record, record.settled_voltage if before is None else before):
         more = f"{notice.message}; its correction without a name is not valid there"
         yield replace(notice, message=more) if is_corrected else notice
 
 
-def _outside_of(model: Model, record: Record) -> Iterator[Notice]:
+def _outside_of(model: Model, record: Record, before: float) -> Iterator[Notice]:
     if not set(KEYS) <= set(model.provenance):
         return
     low, high, slowest, fastest, steepest = (float(model.provenance[key]) for key in KEYS)
@@ -114,10 +122,16 @@ def _outside_of(model: Model, record: Record) -> Iterator[Notice]:
     if drive_moves and SLOWER * motion.slowest < slowest and motion.bandwidth > 0.0:
         said = f"the drive is as slow as {motion.slowest:.3g} Hz, the model was identified from {slowest:.3g} Hz"
         yield Notice("outside_frequencies", said, record.phase)
-    rate = _slew_rate(record)
-    if rate > FASTER * steepest > 0.0:
+    rate, step = _slew_rate(record), _largest_step(record, before)
+    sudden, known = step / record.sample_period, float(model.provenance.get(STEEPEST_STEP, np.inf))
+    is_known_step = motion.is_step and sudden <= FASTER * known
+    if rate > FASTER * steepest > 0.0 and not is_known_step:
         said = f"the drive changes by {slew_text(rate, 4)}, the model was identified up to {slew_text(steepest, 4)}"
         yield Notice("outside_rates", said, record.phase)
+    if step >= MOVES * (high - low) and sudden > FASTER * max(known, rate):
+        said = f"the drive steps by {step:.3g} V in one sample ({slew_text(sudden, 4)})"
+        most = f"the model was identified up to {slew_text(known, 4)}"
+        yield Notice("outside_rates", f"{said}, {most}", record.phase)
 
 
 def _motion(record: Record) -> ExcitationContent:
@@ -150,3 +164,15 @@ def _slew_rate(record: Record) -> float:
     steps = np.abs(np.diff(record.voltage)) - ABOVE * voltage_noise((record,))[0]
     moving = steps[steps > 0.0]
     return float(np.quantile(moving, STEEP)) / record.sample_period if moving.size else 0.0
+
+
+def _largest_step(record: Record, before: float) -> float:
+    """Largest change between two samples, and from the voltage before to the first one [V]."""
+    noise = ABOVE * float(voltage_noise((record,))[0])
+    return max(0.0, float(np.abs(np.diff(record.voltage, prepend=before)).max()) - noise)
+
+
+def _voltages_before(records: Sequence[Record]) -> list[float]:
+    """Voltage before the first sample of every record [V]."""
+    ends = [records[0].settled_voltage, *(float(r.voltage[-1]) for r in records[:-1])]
+    return [end if r.continues else r.settled_voltage for r, end in zip(records, ends, strict=True)]

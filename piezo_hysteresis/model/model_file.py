@@ -55,6 +55,7 @@ _PROVENANCE = {
     "frequency_min": "Hz; rate of the slowest drive between its steps",
     "frequency_max": "Hz; 95 % of the power of dv/dt of the fastest drive between its steps lies below it",
     "slew_rate_max": "V/s; that of 99 % of the samples that move",
+    "step_rate_max": "V/s; the largest between two samples",
     "lag_uncertainty": "s; half of the 95 % interval of the lag, which no broadband record shows",
     "sample_periods": "s; of those records, where none is broadband",
 }

@@ -19,14 +19,19 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from piezo_hysteresis import recording
+from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.free_run_error import errors
+from piezo_hysteresis.identification.identified_range import identified_range
 from piezo_hysteresis.model import model_file
+from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.stage.hidden import HIDDEN_EFFECTS
 
 
@@ -85,6 +90,43 @@ def test_validate_draws_the_printed_results(piezo, identified, folder, tmp_path)
     assert piezo("validate", identified / "model.yaml", triangle, "--figures", tmp_path / "figures").status == 0
     written = {p.name for p in (tmp_path / "figures").iterdir()}
     assert {"gap.svg", "gap.csv", "time_series.png", "residual_tests.csv"} <= written
+
+
+@pytest.fixture
+def late(tmp_path):
+    """A model that is known from slow sines, and a later recording: its step and its ringing were never recorded."""
+    period, time = 1e-3, 1e-3 * np.arange(2000)
+    drive = np.concatenate((np.full(1000, 5.0), 5.0 + 4.0 * np.sin(2.0 * np.pi * time)))
+    swing = Record(4.0 * np.sin(2.0 * np.pi * time), time, period, initial_voltage=0.0)
+    origin = {**identified_range((swing,), (0,)), "voltage_max": "9.0", "largest_record_error": "1e-9"}
+    stage = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=1.0)), period, 10.0, 1e-5, provenance=origin)
+    record = Record(drive, np.zeros(drive.size), period, "step", initial_voltage=0.0)
+    ringing = 1e-7 * np.exp(-time[:1000] / 0.1) * np.cos(600.0 * time[:1000])
+    moved = stage.simulate(record)[0] + np.concatenate((ringing, np.zeros(2000)))
+    moved += 3e-9 * np.random.default_rng(1).normal(size=drive.size)
+    whole = replace(record, displacement=moved)
+    recording.write(Experiment((whole[:1000], whole[1000:])), tmp_path / "later")
+    return model_file.save(stage, tmp_path / "model.yaml"), tmp_path / "later", stage
+
+
+def test_a_drive_outside_the_identified_range_is_the_first_cause_of_a_larger_error(piezo, late):
+    model, later, stage = late
+    said = piezo("validate", model, later).out.split("Verdict: ")[1]
+    assert "The drive leaves the range that the model was identified on, which may be the cause." in said
+    assert said.index("leaves the range") < said.index("Otherwise the stage has changed")
+    known = replace(stage, provenance={**stage.provenance, "step_rate_max": "5000.0", "voltage_min": "0.0"})
+    said = piezo("validate", model_file.save(known, model.with_name("known.yaml")), later).out.split("Verdict: ")[1]
+    assert "have: the stage has changed" in said
+    assert "leaves the range" not in said
+
+
+def test_samples_that_only_determine_the_state_are_not_tested(piezo, late, tmp_path):
+    model, later, _ = late
+    first, second = recording.read(later)[1].split(1000)
+    recording.write(Experiment((replace(first, phase="conditioning"), second)), tmp_path / "led_in")
+    piezo("validate", model, tmp_path / "led_in", "--json", tmp_path / "v.json")
+    answer = json.loads((tmp_path / "v.json").read_text())
+    assert [t["phase"] for t in answer["residual_tests"]] == [p["phase"] for p in answer["phases"]] == ["step"]
 
 
 def test_one_zero_for_all_phases_is_the_stricter_measure(piezo, identified, folder, tmp_path):

@@ -62,6 +62,39 @@ def test_a_step_does_not_hide_the_rates_of_the_sines_after_it():
     assert "the drive reaches 60 Hz, the model was identified up to 1.25 Hz" in fast.message
 
 
+def held(level, before=0.0, **options):
+    drive = np.full(2000, level)
+    return Record(drive, 1e-6 * drive, 1e-3, "step", initial_voltage=before, **options)
+
+
+def known_from(*records):
+    return Model((BoucWen(),), 1e-3, provenance=identified_range(records, range(len(records))))
+
+
+def test_a_step_is_outside_the_range_of_sines_and_inside_that_of_a_step():
+    """A model of sines of 10 Hz had 80 times the noise in a step, without a note."""
+    from_sines, from_a_step = known_from(sine(4.0, 10.0)), known_from(held(4.0), sine(4.0, 10.0))
+    (said,) = outside(from_sines, Experiment((held(5.0),)))
+    assert said.kind == "outside_rates"
+    assert "the drive steps by 5 V in one sample (5000 V/s), the model was identified up to" in said.message
+    assert outside(from_a_step, Experiment((held(5.0), sine(4.0, 10.0)))) == ()
+    later = Record(np.repeat([3.0, 6.0], 1000), np.repeat([3.0, 6.0], 1000), 1e-3, "steps")
+    assert [n.kind for n in outside(from_sines, Experiment((later,)))] == ["outside_frequencies", "outside_rates"]
+    assert "outside_rates" not in [n.kind for n in outside(from_a_step, Experiment((later,)))]
+
+
+def test_a_step_between_two_records_and_in_a_stream_is_reported():
+    rest = held(3.0, before=3.0)
+    after = Record(np.full(2000, 6.0), np.full(2000, 6e-6), 1e-3, "step", continues=True)
+    model = known_from(sine(4.0, 10.0))
+    assert [n.phase for n in outside(model, Experiment((rest, after)))] == ["step"]
+    assert outside(known_from(rest, after, sine(4.0, 10.0)), Experiment((rest, after))) == ()
+    watch = RangeWatch(model, 1e-3)
+    for level in (3.0, 6.0):
+        watch.add(np.full(500, level))
+    assert any("the drive changes by 3000 V/s" in n.message for n in watch.findings())
+
+
 def test_a_rest_in_which_the_drive_hardly_moves_shows_no_frequency():
     drive = 3.0 * (1.0 - np.cos(2.0 * np.pi * TIME))
     rest, sine_1hz = Record(drive, 1e-6 * drive, 1e-3, "rest").split(40)

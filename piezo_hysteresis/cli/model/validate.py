@@ -76,13 +76,14 @@ def run(args: argparse.Namespace) -> int:
     if args.figures is not None:
         _draw(comparison, Path(args.figures).expanduser())
     show(error_table(comparison), frequency_table(comparison), _test_table(tests))
-    show_notices((*experiment.notices, *conditioned, *outside(model, experiment)))
+    beyond = outside(model, experiment)
+    show_notices((*experiment.notices, *conditioned, *beyond))
     if args.figures is not None:
         console().print(f"wrote figures to {args.figures}")
     left = _left(tests)
     if describes(now.percent) and not (left and is_at_floor(comparison, now)):
         left = f" {floor_sentence(comparison, now)}{left}"
-    verdict = f"{error_sentence(now.percent)}{_grown(model, now)}{left}{_caveats(experiment)}"
+    verdict = f"{error_sentence(now.percent)}{_grown(model, now, bool(beyond))}{left}{_caveats(experiment)}"
     console().print(f"Verdict: {verdict}", style="bold")
     severe = any(notice.severe for notice in (*experiment.notices, *conditioned))
     return 0 if describes(now.percent) and not severe else 1
@@ -100,15 +101,21 @@ def _left(tests: list[dict[str, Any]]) -> str:
     )
 
 
-def _grown(model: Model, now: Errors) -> str:
-    """That the error is larger than any that the model had when it was identified."""
+def _grown(model: Model, now: Errors, leaves_range: bool) -> str:
+    """That the error is larger than any that the model had when it was identified.
+
+    `leaves_range` says whether a drive is outside of what the model was identified on, which is the first cause to name.
+    """
     known = 100.0 * known_error(model, LARGEST) / now.range
     largest = max(row.percent for row in now.judged)
     if not known or not describes(now.percent) or is_as_good(largest, known):
         return ""
+    first = ": the"
+    if leaves_range:
+        first = ". The drive leaves the range that the model was identified on, which may be the cause. Otherwise the"
     return (
         f" In one phase it is {largest:.3g} %, {largest / known:.2g} times the largest that the model is known to "
-        "have: the stage has changed, or the drive shows what the model misses; see piezo diagnose --model."
+        f"have{first} stage has changed, or the drive shows what the model misses; see piezo diagnose --model."
     )
 
 
@@ -147,9 +154,10 @@ def answer(comparison: ModelComparison, now: Errors, tests: list[dict[str, Any]]
 
 def _tests(experiment: Experiment, now: Errors) -> list[dict[str, Any]]:
     tests = []
-    for record, residual in zip(experiment, now.residuals, strict=True):
+    for row in now.judged:  # without the part before the first full loop
+        record = experiment[row.index]
         try:
-            found = correlate(residual, record.voltage, record.sample_period)
+            found = correlate(now.residuals[row.index], record.voltage, record.sample_period)
         except RecordError:
             continue
         tests.append(
