@@ -32,7 +32,7 @@ FALSE_ALARMS = 0.01
 LONGEST_MEMORY, SHARE_OF_MEMORY = 40, 20
 """Highest order of the autoregression of the residual, and smallest number of samples per coefficient."""
 FEWEST_INDEPENDENT = 20.0
-"""Effective number of samples below which the cross-correlation is not tested."""
+"""Effective number of samples, and of those in which the drive moves, below which a cross-correlation is not tested."""
 FEWEST_DIRECTIONS = 5.0
 """Order of persistent excitation of the filtered drive below which a small cross-correlation proves nothing.
 
@@ -47,7 +47,8 @@ CAPTION = (
     "the drive, and something is missing in the model. If only the auto-correlation exceeds "
     "its bounds, the noise of the sensor may be coloured. For the cross-correlation, residual "
     "and drive pass the filter that makes the residual white. Undecided means that this test says "
-    "nothing: the drive has too few frequencies, as a sine or a triangle, or the record is too short."
+    "nothing: the drive has too few frequencies, as a sine or a triangle, or it moves in too few samples, as a step, "
+    "or the record is too short."
 )
 """Explanation of the test of whiteness."""
 
@@ -75,6 +76,9 @@ class Correlation:
     excitation_order : float
         Effective order of persistent excitation of u', m²/Σ ρ_u'² over an m × m correlation matrix; infinite if e is
         white without a filter, because then a drive of any frequencies would colour it.
+    moving_samples : float
+        Effective number of samples in which u' is large, (Σ u'²)²/Σ u'⁴; infinite if e is white without a filter. A
+        step before the first sample, or a rest with a few samples of motion, shows the test nothing of what follows.
     """
 
     lag: Array
@@ -85,12 +89,13 @@ class Correlation:
     cross_bound: float
     effective_samples: float
     excitation_order: float
+    moving_samples: float
 
     @property
     def decides(self) -> bool:
-        """False if the drive contains too few frequencies, or the residual is too small, for any conclusion."""
-        has_power = self.effective_samples >= FEWEST_INDEPENDENT and self.excitation_order >= FEWEST_DIRECTIONS
-        return has_power or not self.is_independent
+        """False if the drive has too few frequencies or moves too little, or the residual is too small."""
+        enough = min(self.effective_samples, self.moving_samples) >= FEWEST_INDEPENDENT
+        return (enough and self.excitation_order >= FEWEST_DIRECTIONS) or not self.is_independent
 
     @property
     def is_white(self) -> bool:
@@ -146,11 +151,12 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
     k = np.arange(-lags, lags + 1)
     z = float(scipy.stats.norm.isf(FALSE_ALARMS / 2 / k.size))
     if auto_e[0] <= PREDICTABLE * power_e or auto_u[0] <= PREDICTABLE * power_u:
-        cross, effective, order = np.zeros(k.size), 0.0, 0.0
+        cross, effective, order, moves = np.zeros(k.size), 0.0, 0.0, 0.0
     else:
         cross = both[k] / np.sqrt(power)
         effective = innovations.size / max(1.0, float(auto_e @ auto_u) / power)
         order = _order(auto_u[: 2 * min(LONGEST_MEMORY, n // 4)] / auto_u[0]) if memory.size > 1 else np.inf
+        moves = float(auto_u[0]) ** 2 / float(np.sum(drive**4)) if memory.size > 1 else np.inf
     return Correlation(
         lag=np.asarray(sample_period * np.arange(lags + 1)),
         auto=auto[: lags + 1] / power_e,
@@ -160,6 +166,7 @@ def correlate(residual: Array, voltage: Array, sample_period: float, lags: int =
         cross_bound=float(np.tanh(z / np.sqrt(effective - 3.0))) if effective >= FEWEST_INDEPENDENT else 1.0,
         effective_samples=effective,
         excitation_order=order,
+        moving_samples=moves,
     )
 
 

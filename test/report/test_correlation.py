@@ -114,3 +114,16 @@ def test_a_model_without_creep_fails_on_slow_drives_too(phase, gamma):
     assert found.decides
     assert found.cross_bound < 0.3
     assert found.is_independent is (gamma == 0.0)
+
+
+@pytest.mark.parametrize("moving", [0, 16])
+def test_a_ringing_after_a_step_before_the_first_sample_is_not_passed(moving):
+    """The drive is constant while the residual rings; the motion of its last samples passed the test."""
+    time = 1e-4 * np.arange(10_000)
+    drive = np.full(time.size, 5.0)
+    drive[time.size - 1 - moving :] += 1e-3 * np.arange(moving + 1)
+    drive[-1] += 1e-3
+    ringing = np.exp(-100.0 * time) * np.sin(2.0 * np.pi * 700.0 * time)
+    found = correlate(ringing + 1e-3 * np.random.default_rng(1).normal(size=time.size), drive, 1e-4)
+    assert not found.is_white
+    assert not found.decides

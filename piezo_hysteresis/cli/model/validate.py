@@ -104,7 +104,7 @@ def _left(tests: list[dict[str, Any]]) -> str:
 def _grown(model: Model, now: Errors, leaves_range: bool) -> str:
     """That the error is larger than any that the model had when it was identified.
 
-    `leaves_range` says whether a drive is outside of what the model was identified on, which is the first cause to name.
+    `leaves_range` says whether a drive is outside of what the model was identified on: the first cause to name.
     """
     known = 100.0 * known_error(model, LARGEST) / now.range
     largest = max(row.percent for row in now.judged)

@@ -43,7 +43,7 @@ def whiteness(comparison: ModelComparison) -> Drawing | None:
         if members:
             break
     else:
-        members = [max(range(len(comparison.experiment)), key=lambda i: comparison.experiment[i].size)]
+        members = [max(now.judged, key=lambda row: row.size).index]
     record = comparison.experiment[members[0]]
     try:
         found = correlate(
