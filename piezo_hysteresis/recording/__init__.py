@@ -140,7 +140,7 @@ def read(
         held = ", ".join(dict.fromkeys(r.phase for r in records))
         raise RecordingError(f"{paths[0]}: `decimate`: no phase {min(unknown)!r}, expected one of {held}")
     experiment = Experiment(tuple(records), ", ".join(str(Path(path).expanduser()) for path in paths))
-    return experiment.noting(*notices, *inspect(experiment))
+    return experiment.noting(*notices, *inspect(experiment, options.units.get("displacement")))
 
 
 def from_columns(
@@ -178,7 +178,7 @@ def from_columns(
     """
     options = ReadOptions(None, names or {}, units or {}, sample_period, initial_voltage)
     experiment = checked_starts(experiment_from(columns, options), options)
-    return experiment.noting(*inspect(experiment))
+    return experiment.noting(*inspect(experiment, options.units.get("displacement")))
 
 
 def _parts(place: Path, chosen: Format, parts: Sequence[ReadOptions]) -> list[Experiment]:

@@ -66,8 +66,8 @@ def add_reading_group(parser: argparse.ArgumentParser) -> None:
         metavar="CHANNEL=UNIT",
         action="append",
         default=[],
-        help="unit of a channel, e.g. displacement=um, or its SI value, e.g. displacement=2e-6 for a sensor of 2 um/V "
-        "(repeatable)",
+        help="unit of a channel, e.g. displacement=um, or its SI value, e.g. displacement=2e-6 for a sensor of 2 um/V; "
+        "displacement=-um for a reversed sensor, displacement=- for one in the unit of the file (repeatable)",
     )
     group.add_argument("--sample-period", metavar="S", type=float, help="time between samples [s]")
     group.add_argument(

@@ -22,6 +22,7 @@ import numpy as np
 
 from ...record import Experiment, Notice, Record, Samples
 from ..segmentation.waveform import phase_name
+from ..table.units import REVERSED
 from .channel_defects import channel_defects
 from .initial_condition_check import not_at_rest, origins
 from .lag import lag_notices
@@ -54,8 +55,15 @@ _SINE = re.compile(r"sine_(\d+(?:\.\d+)?(?:e[+-]?\d+)?)hz")
 """Phase name of a sine, with its frequency [Hz]."""
 
 
-def inspect(experiment: Experiment) -> tuple[Notice, ...]:
+def inspect(experiment: Experiment, unit: str | float | None = None) -> tuple[Notice, ...]:
     """Check every channel of every record, and compare the records with each other.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Records in SI units.
+    unit : str or float, optional
+        Unit of the displacement that was given to the reader.
 
     Returns
     -------
@@ -75,7 +83,7 @@ def inspect(experiment: Experiment) -> tuple[Notice, ...]:
     leading = {notice.phase for notice in late if notice.kind == "leads"}
     notices += late
     notices += [found for record in moving if record.phase not in leading and (found := swapped(record))]
-    notices += _polarity(moving)
+    notices += _polarity(moving, unit)
     for record in experiment:
         notices += not_at_rest(record)
     return (*notices, *origins(experiment))
@@ -184,8 +192,11 @@ def _correlation(voltage: Samples, displacement: Samples) -> float:
     return float(u @ y) / max(float(np.sqrt((u @ u) * (y @ y))), 1e-300)
 
 
-def _polarity(moving: list[Record]) -> list[Notice]:
-    """Notice where the displacement falls when the voltage rises, in the record with the slowest drive."""
+def _polarity(moving: list[Record], unit: str | float | None) -> list[Notice]:
+    """Notice where the displacement falls when the voltage rises, in the record with the slowest drive.
+
+    A loop of this sign is described badly, so the notice says how the sensor is reversed on reading.
+    """
     slowest = min(moving, key=lambda r: _fundamental(r)[0], default=None)
     if slowest is None or slowest.size < 64:
         return []
@@ -199,4 +210,7 @@ def _polarity(moving: list[Record]) -> list[Notice]:
             return []
     elif float(np.real(y[at] * np.conj(u[at]))) >= 0.0:
         return []
-    return [Notice("polarity", "the displacement falls when the voltage rises", slowest.phase)]
+    given = "" if unit is None else f"{unit}"
+    turned = "a unit without the minus" if given.startswith(REVERSED) else f"`units` displacement={REVERSED}{given}"
+    message = f"the displacement falls when the voltage rises; if the sensor is reversed, give {turned}"
+    return [Notice("polarity", message, slowest.phase)]

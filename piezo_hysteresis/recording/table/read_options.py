@@ -25,7 +25,7 @@ import numpy as np
 from ...channel_mapping import quantity_of
 from ...errors import RecordingError
 from ...record import Samples
-from .units import si_factor
+from .units import REVERSED, si_factor
 
 CHANNELS = ("time", "voltage", "displacement")
 """Channels that a recording must have, unless its sample period is given; `is_channel` decides about further ones."""
@@ -66,7 +66,8 @@ class ReadOptions:
         Channel (see `is_channel`) or label (one of `LABELS`) to its place: a column number counted from 1, the name of
         a column, key or variable, or ``/topic.field[element]`` in a bag.
     units : mapping of str to str or float
-        Channel to its unit (``um``, ``nm``, ``mV``, ``ms``, …) or to the SI value of one count.
+        Channel to its unit (``um``, ``nm``, ``mV``, ``ms``, …) or to the SI value of one count. A minus before it, or
+        alone for the unit in the file, reverses a channel: ``-um``, ``-``.
     sample_period : float, optional
         Time between samples [s]; it replaces that of the file.
     initial_voltage : float, optional
@@ -133,6 +134,8 @@ class ReadOptions:
     def in_si(self, channel: str, values: Samples, unit: str | None = None) -> Samples:
         """Values of a channel in SI units, by the given unit or else by the `unit` in the file."""
         given = self.units.get(channel, unit)
+        if given == REVERSED:
+            given = f"{REVERSED}{unit or ''}"
         factor = 1.0 if given is None else si_factor(channel, given)
         return values if factor == 1.0 else np.asarray(values * factor)
 

@@ -74,6 +74,10 @@ def is_unit(word: str) -> bool:
     return any(plain(word) in known for known in _UNITS.values())
 
 
+REVERSED = "-"
+"""A minus before a unit, or alone for the unit in the file: the sensor is reversed."""
+
+
 def si_factor(channel: str, unit: str | float) -> float:
     """SI value of one `unit` of a channel.
 
@@ -82,7 +86,8 @@ def si_factor(channel: str, unit: str | float) -> float:
     channel : str
         Channel name, e.g. ``"displacement"``.
     unit : str or float
-        Unit word, or a number: the SI value of one count (a sensor of 2 µm/V recorded in V has 2e-6).
+        Unit word, with a minus for a reversed sensor, or a number: the SI value of one count (a sensor of 2 µm/V
+        recorded in V has 2e-6). A minus alone is that of the SI unit.
 
     Raises
     ------
@@ -91,13 +96,16 @@ def si_factor(channel: str, unit: str | float) -> float:
 
     Examples
     --------
-    >>> si_factor("displacement", "um"), si_factor("displacement", 2e-6)
-    (1e-06, 2e-06)
+    >>> si_factor("displacement", "um"), si_factor("displacement", 2e-6), si_factor("displacement", "-um")
+    (1e-06, 2e-06, -1e-06)
     """
     known = units_of(channel)
     if isinstance(unit, str):
-        if plain(unit) in known:
-            return known[plain(unit)]
+        if unit == REVERSED:
+            return -1.0
+        sign, word = (-1.0, plain(unit[1:])) if unit.startswith(REVERSED) else (1.0, plain(unit))
+        if word in known:
+            return sign * known[word]
         try:
             unit = float(unit)
         except ValueError:

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from piezo_hysteresis.record import Experiment, Record
-from piezo_hysteresis.recording import inspect, read, write
+from piezo_hysteresis.recording import from_columns, inspect, read, write
 from piezo_hysteresis.recording.checks.initial_condition_check import departures, is_within_its_loop
 from piezo_hysteresis.recording.checks.lag import lag_of
 from piezo_hysteresis.recording.table import text_cells
@@ -247,6 +247,20 @@ def test_columns_shifted_against_each_other_are_reported():
 def test_a_stage_that_moves_against_its_drive_is_reported():
     drive = sine()
     assert kinds(Record(drive, -stage(drive), PERIOD, "sine_5hz")) == {"polarity"}
+
+
+@pytest.mark.parametrize(("title", "unit"), [("displacement_um", None), ("displacement", "um"), ("displacement", 1e-6)])
+def test_the_notice_of_a_reversed_sensor_names_the_option_that_turns_it(title, unit):
+    drive = sine()
+    columns = {"time_s": PERIOD * np.arange(drive.size), "voltage_V": drive, title: -1e6 * stage(drive)}
+    units = {} if unit is None else {"displacement": unit}
+    (notice,) = (n for n in from_columns(columns, units=units).notices if n.kind == "polarity")
+    assert "if the sensor is reversed, give `units` displacement=-" in notice.message
+    turned = notice.message.split("displacement=")[1]
+    assert turned == {None: "-", "um": "-um", 1e-6: "-1e-06"}[unit]
+    read = from_columns(columns, units={"displacement": turned})
+    assert "polarity" not in {n.kind for n in read.notices}
+    assert read[0].displacement == pytest.approx(stage(drive))
 
 
 @pytest.mark.parametrize("periods", [1, 3])
