@@ -166,6 +166,18 @@ def test_drives_of_a_few_millihertz_need_no_mode(period):
     assert ExtraResonance.name not in model
 
 
+def check_reason(found):
+    """The message lists the chosen structure, and gives a reason if another one in the list has a smaller error."""
+    (said,) = (n.message for n in found.notices if n.kind == "structure")
+    choice, errors = said.split("; prediction errors in units of the noise floor: ")
+    chosen = choice.split("left out, ")[1].split(" was chosen")[0]
+    values = {name: float(value) for name, value in (e.rsplit(" ", 1) for e in errors.split("; "))}
+    assert values[chosen] == min(values.values()) or "the simplest within 1 % of the best" in choice
+    no_plays = HysteresisMemory.name not in found.model
+    assert ("among the structures with plays" in choice) is no_plays
+    assert any("takes their place" in n.message for n in found.notices if n.kind == "memory") is no_plays
+
+
 @pytest.mark.parametrize("step", [False, True])
 def test_one_rate_leaves_creep_in_the_model(step):
     """A longer lag or wider plays have the influence of creep at one rate, but predict other rates badly."""
@@ -173,6 +185,7 @@ def test_one_rate_leaves_creep_in_the_model(step):
     swing = np.concatenate([level * (1.0 - np.cos(2.0 * np.pi * time)) for level in (1.0, 2.0, 3.0, 4.0, 5.0)])
     fitted = growing_sine(1.0, PERIOD) if step else swing
     found = identify(Experiment((STAGE.play(fitted, PERIOD, "sine_1hz"),)), memory=True)
+    check_reason(found)
     assert all(j.structure.creep_rates > 0 for j in found.structure.judged)
     assert {"creep", "creep_two_rates"} & {e.name for e in found.model.effects}
     faster = Experiment((STAGE.play(swing[::10], PERIOD, "sine_10hz"),))
@@ -252,5 +265,6 @@ def test_the_leads_of_effects_are_known_beside_the_operator_too():
     noisy = [replace(r, displacement=y + 3e-9 * rng.normal(size=y.size)) for r, y in zip(still, moved, strict=True)]
     found = identify(Experiment(tuple(noisy)), memory=True)
     assert HysteresisMemory.name not in found.model and Creep.name in found.model
+    check_reason(found)
     assert found.structure.leads[Creep.name] > 1.0
     assert HysteresisMemory.name not in found.structure.leads

@@ -60,6 +60,8 @@ DISCOUNTS = 2
 """Number of times that the weights of steps are adapted to their misfit; the first fit takes part of it up."""
 TIE = 0.02
 """Difference of scores (mean ln R²) within which the structure with fewer parameters is chosen."""
+SIMPLER = f", because it is the simplest within {100 * np.expm1(0.5 * TIE):.0f} % of the best one"
+"""Addition to the message if the chosen structure is not the best one."""
 CREEPS = (Creep.name, CreepTwoRates.name)
 """Forms of creep."""
 LEADS = 0.35
@@ -130,19 +132,20 @@ def choose_structure(
     progress("structure: fit", 0.7)
     final = fit_structure(_reduced(full.model, chosen), pieces, sizes, held)
     progress("structure: rival", 0.85)
-    described = "; ".join(f"{_words(j.structure)} {np.exp(0.5 * j.score):.3g}" for j in judged[:3])
+    described = "; ".join(f"{_words(j.structure)} {np.exp(0.5 * j.score):.3g}" for j in _listed(judged, chosen))
     rival, lead = _rival(start, final, pieces, sizes)
     notices = linear.notices(rival or final)
     notices.append(
         Notice(
             "structure",
-            f"by prediction of rates, amplitudes and records left out, {_words(chosen.structure)} was chosen; "
+            f"by prediction of rates, amplitudes and records left out, {_words(chosen.structure)} was chosen"
+            f"{'' if rival is None else ' among the structures with plays'}{'' if chosen is best else SIMPLER}; "
             f"prediction errors in units of the noise floor: {described}",
         )
     )
     if rival is not None:
-        message = f"{start.hysteresis.name} predicts data left out better by a factor of {np.exp(0.5 * lead):.3g}"
-        notices.append(Notice("memory", f"{message}, so it is used instead of plays"))
+        message = f"predicts data left out better than the plays by a factor of {np.exp(0.5 * lead):.3g}"
+        notices.append(Notice("memory", f"{start.hysteresis.name} {message}, so it takes their place"))
         nothing = np.zeros((len(rival.names),) * 2)
         leads = {**linear.leads, **_leads_of_operator(start, full, chosen, pieces, sizes)}
         fit = as_fit(rival, pieces, sizes, nothing, linear.open_lag)
@@ -152,6 +155,11 @@ def choose_structure(
     leads = {MEMORY.name: -lead, **linear.leads, **_leads(chosen, judged)}
     fit = as_fit(final, pieces, sizes, spread, linear.open_lag)
     return StructureChoice(fit, tuple(judged), leads, tuple(notices))
+
+
+def _listed(judged: Sequence[Judged], chosen: Judged) -> list[Judged]:
+    """The best structures, and the chosen one if it is not among them."""
+    return [*judged[:3], *([chosen] if chosen not in judged[:3] else [])]
 
 
 def _leads(chosen: Judged, judged: Sequence[Judged]) -> dict[str, float]:
