@@ -14,7 +14,7 @@
 
 """`piezo`: one command for everything that needs no ROS.
 
-Exit status: 0 done (also for every verdict of ``piezo diagnose``), 1 not converged or not identifiable, 2 bad input.
+Exit status: 0 done (also for every verdict of ``piezo diagnose``), 1 if the result cannot be trusted, 2 bad input.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def _parser(chosen: str | None) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="piezo",
         description="Identify models of piezo stages, check them, and find missing physical effects.",
-        epilog="exit status: 0 done; 1 the result cannot be trusted, the last line says why; 2 bad input",
+        epilog="exit status: 0 success, 1 if the result cannot be trusted (the last line says why), 2 for bad input",
     )
     parser.add_argument("--version", action="version", version=f"piezo_hysteresis {__version__}")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)

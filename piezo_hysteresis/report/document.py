@@ -29,13 +29,12 @@ from .figures.comparison import ModelComparison
 from .figures.drawing import Drawing
 from .tables.table import Table
 from .verdict import VerdictText
-from .words import nanometre
+from .words import FLOOR, nanometre
 
 FREE_RUN = (
     "Errors are those of free-run simulation: the model uses the drive and not the measured displacement. Percentages\n"
-    "are RMS over the peak-to-peak displacement of the experiment. The noise floor of a phase is its sensor noise or\n"
-    "0.03 % of the range, whichever is larger. Click a figure to enlarge it. piezo view EXPERIMENT shows every sample, "
-    "with zoom."
+    f"are RMS over the peak-to-peak displacement of the experiment. {FLOOR}\n"
+    "Click a figure to enlarge it. piezo view EXPERIMENT shows every sample, with zoom."
 )
 """Explanation of the numbers of a page about an experiment."""
 

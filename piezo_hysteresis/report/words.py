@@ -12,12 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Lengths and times as text, with a suitable unit."""
+"""Lengths and times as text, with a suitable unit, and what the pages and the terminal both say of an error."""
 
 from __future__ import annotations
 
+from ..identification.fit.form_uncertainty import ADEQUACY
+
 USELESS, POOR = 30.0, 3.0
 """Free-run errors [% of range] from which a model describes nothing, and from which it is poor."""
+FLOOR = f"The noise floor of a phase is its sensor noise or {100 * ADEQUACY:g} % of the range, whichever is larger."
+"""What the floor beside an error is."""
 
 
 def nanometre(metres: float) -> str:

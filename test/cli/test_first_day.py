@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from piezo_hysteresis.stage.simulated import SimulatedStage
 
 from ..piezo_command import piezo
 
+README = Path(__file__).parents[2] / "README.md"
 TIME = np.arange(400) * 5e-3
 VOLTAGE = 1.8 - 1.8 * np.cos(2 * np.pi * TIME)
 MICRONS = 12.0 * VOLTAGE
@@ -235,6 +237,20 @@ def test_an_undetermined_fit_is_reported_with_status_1(tmp_path):
     fit = SimpleNamespace(converged=False, iterations=40, at_bounds=())
     said = verdict_line(SimpleNamespace(fit=fit, free_run_percent=5.0, notices=()))
     assert said.startswith("Verdict: not determined. The fit did not converge in 40 linearisations")
+
+
+def test_a_parameter_at_a_bound_has_no_interval_and_the_result_counts(tmp_path):
+    """It was called undetermined, beside status 0; README and help state status 1 only if nothing can be trusted."""
+    from types import SimpleNamespace
+
+    from piezo_hysteresis.cli.model.identify import verdict_line
+
+    model = SimpleNamespace(row=lambda name: SimpleNamespace(off=None))
+    fit = SimpleNamespace(converged=True, at_bounds=("arx.delay",), model=model, values={"arx.delay": 0.0})
+    said = verdict_line(SimpleNamespace(fit=fit, free_run_percent=0.3, notices=()))
+    assert said.endswith("At a bound of the range, and therefore without an interval: arx.delay.")
+    for text in (piezo("--help").stdout, README.read_text(encoding="utf-8")):
+        assert "1 if the result cannot be trusted" in " ".join(text.split())
 
 
 def test_swapped_channels_are_found(tmp_path):

@@ -126,7 +126,7 @@ def verdict_line(found: Identification) -> str:
         f" {severe} severe finding{'s' * (severe > 1)} above make{'s' * (severe == 1)} it doubtful." if severe else ""
     )
     names = ", ".join(undetermined(fit))
-    at_bounds = f" At a bound, so undetermined: {names}." if names else ""
+    at_bounds = f" At a bound of the range, and therefore without an interval: {names}." if names else ""
     return f"Verdict: {error_sentence(percent)}{caveat}{at_bounds}"
 
 

@@ -28,6 +28,9 @@ from .selection_result import Rejection, explained, typical
 KEEPS = 0.8
 """Largest share of V beyond noise that may remain after an effect."""
 
+SHOWN = 0.005
+"""Smallest gain that a number with two decimals shows."""
+
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
 """Smallest number of mains periods in a record, longest sample period in mains periods, smallest number of records."""
 STEADY = 0.3
@@ -38,9 +41,8 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
     """First reason to reject a fitted candidate; None if it passes all tests. The cheap tests come first."""
     gain = before.cost - best.score.cost
     if gain < LEAST_GAIN:
-        return Rejection(
-            best.name, f"in cross-validation it lowers mean ln R² by {gain:.2f}, and {LEAST_GAIN:g} is needed"
-        )
+        lowers = f"lowers mean ln R² by {gain:.2f}" if gain >= SHOWN else "does not lower mean ln R²"
+        return Rejection(best.name, f"in cross-validation it {lowers}, and a decrease by {LEAST_GAIN:g} is needed")
     left = (1.0 - explained(*typical(before, best.score), best.training_data.null)) ** 2
     if left > KEEPS:
         return Rejection(
@@ -51,7 +53,8 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
     alone = without(best)
     owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
     if owed < LEAST_GAIN:
-        return Rejection(best.name, f"it gains only {owed:.2f} over the model that was refitted without it")
+        gains = f"gains only {owed:.2f}" if owed >= SHOWN else "gains nothing"
+        return Rejection(best.name, f"it {gains} over the model that was refitted without it")
     return None
 
 

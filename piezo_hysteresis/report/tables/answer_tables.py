@@ -20,6 +20,7 @@ from collections.abc import Iterator, Mapping
 from itertools import groupby
 from typing import Any
 
+from ..words import FLOOR
 from .table import Table
 
 _GAP = ("before", "after", "floor")
@@ -89,7 +90,7 @@ def gap_table(answer: Mapping[str, Any]) -> Table | None:
     if gap.get("before") is not None:
         rows.append(("all phases", *(_percent(gap.get(key)) for key in _GAP)))
     seen = "the test records" if gap.get("unseen", True) else "the fitted data"
-    note = f"Free-run error in % of the range, on {seen}; floor is the error that noise alone causes."
+    note = f"Free-run error in % of the range, on {seen}. {FLOOR}"
     return Table("Gap", ("phase", *_GAP), tuple(rows), note, frozenset({1, 2, 3})) if rows else None
 
 

@@ -24,10 +24,12 @@ from piezo_hysteresis.effects import Arx, BoucWen, HysteresisMemory
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Notice
+from piezo_hysteresis.report.document import FREE_RUN
+from piezo_hysteresis.report.tables.answer_tables import gap_table
 from piezo_hysteresis.report.tables.error_table import error_table, frequency_table
 from piezo_hysteresis.report.tables.parameter_table import correlation_table, parameter_table
 from piezo_hysteresis.report.tables.quality_table import notice_table, record_table
-from piezo_hysteresis.report.words import duration, nanometre
+from piezo_hysteresis.report.words import FLOOR, duration, nanometre
 
 
 def test_every_phase_has_its_error_before_and_after(comparison):
@@ -84,6 +86,14 @@ def test_the_data_are_reported_as_they_are(experiment, comparison):
     assert record_table(data, comparison.noise[:1]).rows[0][-1] == "truncated"
     assert [row[0] for row in notice_table(data).rows] == ["gap", "minor"], "the severe first"
     assert notice_table(Experiment((truncated,))) is None
+
+
+def test_the_floor_is_explained_in_one_sentence_everywhere():
+    """Errors of 0.020 stood beside a floor of 0.030, which was called the error that noise alone causes."""
+    gap = {"before": 0.3, "after": 0.02, "floor": 0.03, "unseen": True, "per_phase": {}}
+    table = gap_table({"gap_percent_of_range": gap})
+    assert FLOOR.endswith("sensor noise or 0.03 % of the range, whichever is larger.")
+    assert table.note.endswith(FLOOR) and FLOOR in FREE_RUN
 
 
 def test_small_lengths_and_times_have_fitting_units():
