@@ -18,6 +18,7 @@ One constant is free per record, as everywhere.
 """
 
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +89,24 @@ def test_the_bouc_wen_state_does_not(fitted, unseen, identified):
 def test_delay_and_pole_come_from_the_first_moments(identified):
     assert identified.model["arx"]["delay"] == pytest.approx(1.0, abs=0.3)
     assert amplifier_of(identified.model)["tau"] == pytest.approx(13e-3, abs=2e-3)
+
+
+def test_the_page_states_the_numbers_of_its_commands(identified, diagnosed, folder):
+    """It stated another creep, and the lag of the whole file beside the rows."""
+    page = (Path(__file__).parents[2] / "docs" / "real_recordings.md").read_text(encoding="utf-8")
+    creep, lag, whole = (
+        float(re.search(rf"{words}([\d.]+){unit}", page)[1])
+        for words, unit in (
+            (r"Creep of one rate, ", " % per decade"),
+            (r"For the rows above it is ", " ms"),
+            (r"\(", r" ms for the whole\s+record\)"),
+        )
+    )
+    for model in (identified.model, diagnosed.model):
+        assert 100.0 * model["creep"]["gamma"] == pytest.approx(creep, abs=0.02)
+    for read_lag, rows in ((lag, (0, 7000)), (whole, None)):
+        (notice,) = (n for n in read(folder / "Model_Vi_Do.dat", rows=rows).notices if n.kind == "late")
+        assert f"by {read_lag / 1e3:.4g} s" in notice.message
 
 
 def test_drift_in_addition_to_creep_does_not_increase_the_error(fitted, unseen):
