@@ -123,15 +123,15 @@ def _outside_of(model: Model, record: Record, before: float) -> Iterator[Notice]
         said = f"the drive is as slow as {motion.slowest:.3g} Hz, the model was identified from {slowest:.3g} Hz"
         yield Notice("outside_frequencies", said, record.phase)
     rate, step = _slew_rate(record), _largest_step(record, before)
-    sudden, known = step / record.sample_period, float(model.provenance.get(STEEPEST_STEP, np.inf))
-    is_known_step = motion.is_step and sudden <= FASTER * known
+    sudden, steepest_step = step / record.sample_period, float(model.provenance.get(STEEPEST_STEP, np.inf))
+    is_known_step = motion.is_step and sudden <= FASTER * steepest_step < np.inf
     if rate > FASTER * steepest > 0.0 and not is_known_step:
         said = f"the drive changes by {slew_text(rate, 4)}, the model was identified up to {slew_text(steepest, 4)}"
         yield Notice("outside_rates", said, record.phase)
-    if step >= MOVES * (high - low) and sudden > FASTER * max(known, rate):
+    if step >= MOVES * (high - low) and sudden > FASTER * max(steepest_step, rate):
         said = f"the drive steps by {step:.3g} V in one sample ({slew_text(sudden, 4)})"
-        most = f"the model was identified up to {slew_text(known, 4)}"
-        yield Notice("outside_rates", f"{said}, {most}", record.phase)
+        said += f", the model was identified up to {slew_text(steepest_step, 4)}"
+        yield Notice("outside_rates", said, record.phase)
 
 
 def _motion(record: Record) -> ExcitationContent:
