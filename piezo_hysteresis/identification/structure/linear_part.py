@@ -73,7 +73,8 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     lags = (*LAGS, *_late_responses(pieces))
     plain = fit_from_best([model.with_values({DELAY: lag}) for lag in lags], pieces, floors)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
-    start, late = best, with_slew_limit(best, pieces, floors)
+    start = best
+    late = limited = with_slew_limit(best, pieces, floors)
     if not is_settled(best, pieces):
         limited, its_lead = _behind_slew_limit(plain, late, lead, pieces, floors)
         if max(_shares_left(limited, best, pieces)) < SECOND:
@@ -82,7 +83,7 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     best, *others = in_every_place(best, pieces, floors)
     if AmplifierSlewLimitHeld.name not in best.model:
         # it may be as likely as a pole or a delay
-        others.append(late if best is start else with_slew_limit(best, pieces, floors))
+        others += [limited, late if best is start else with_slew_limit(best, pieces, floors)]
     fast = _with_two_more_orders(plain, best, pieces, floors)
     if fast is not best:
         return LinearPart(fast, 0.0)

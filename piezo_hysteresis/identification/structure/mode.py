@@ -81,9 +81,10 @@ def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[flo
     if top <= SLOWEST:
         return plain
     slower = [f for f in (times * fastest for times in SILENT) if SLOWEST < f < top]
-    starts = [(ExtraResonance(r=1.0, f0=f, zeta=SILENT_DAMPING), (SHARE, SHAPE[1])) for f in slower]
-    starts.append((ExtraResonance(r=0.5, f0=top, zeta=SILENT_DAMPING), SHAPE))
-    begun = [fit_structure(plain.model.with_effect(mode), pieces, floors, held, FEW) for mode, held in starts]
+    begun = []
+    for share, frequency, held in (*((1.0, f, (SHARE, SHAPE[1])) for f in slower), (0.5, top, SHAPE)):
+        mode = ExtraResonance(r=share, f0=frequency, zeta=SILENT_DAMPING)
+        begun.append(fit_structure(plain.model.with_effect(mode), pieces, floors, held, FEW))
     best = min(begun, key=lambda f: f.cost)
     return fit_structure(best.model, pieces, floors, held_by(best))
 
