@@ -189,13 +189,13 @@ def conclusion_of_few(
     closed = f"{100 * gap.explained:.0f} %"
     names = [s.best.effect.public_name() for s in selection.accepted]
     if decided and named:
-        rivals = [n for s in selection.accepted for n in s.confusable_with]
+        alike = [(s.best.effect.public_name(), s.confusable_with) for s in selection.accepted if s.confusable_with]
         said = (
             f"The model does not contain {' and '.join(names)}. An extended model predicts rates, amplitudes and "
             f"records better that were left out of the fit; it explains {closed} of the gap."
         )
-        alike = f" These data cannot distinguish {' or '.join(rivals)} from it." if rivals else ""
-        return Conclusion.MISSING_EFFECT, said + alike + ("" if selection.in_time else MORE_MAY_BE_MISSING)
+        said += "".join(f" These data cannot distinguish {name} from {' or '.join(r)}." for name, r in alike)
+        return Conclusion.MISSING_EFFECT, said + ("" if selection.in_time else MORE_MAY_BE_MISSING)
     is_adequate = before.excess <= ADEQUATE
     if count >= FEWEST_RECORDS and not decided and (several or is_adequate):
         judged = replace(gap, after=gap.before) if is_adequate and not named else gap  # of the published model
