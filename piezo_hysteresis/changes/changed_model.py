@@ -24,16 +24,17 @@ import numpy as np
 from ..effects import ExtraResonance, Softening, ThermalDrift
 from ..identification.records.noise_floor import stroke
 from ..model.model import Model
+from ..online.change.score import loop_heights
 from ..record import Record
 from .change_kinds import ParameterChange
-from .signatures import DRIFT_TIME, creep_numbers, loop_numbers, shaped_model
+from .signatures import DRIFT_TIME, creep_numbers, shaped_model
 
 
 def changed_model(model: Model, change: ParameterChange, records: Sequence[Record]) -> Model:
     """The given model with the change, and with the new gain and loop height."""
     values = model.values()
     gain, loop = change.session.get("gain", 0.0), change.session.get("loop", 0.0)
-    numbers = {n: v * (1.0 + loop) for n, v in loop_numbers(model).items()} if loop else {}
+    numbers = {n: v * (1.0 + loop) for n, v in loop_heights(model).items()} if loop else {}
     if change.kind.family == "lag":
         model = shaped_model(model, change.key, change.size)
     elif change.kind.name == ExtraResonance.name:

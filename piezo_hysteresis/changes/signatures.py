@@ -43,6 +43,7 @@ from ..errors import DivergenceError
 from ..identification.steps.remaining_lag import amplifier_of
 from ..model.chain import RUNAWAY
 from ..model.model import Model
+from ..online.change.score import loop_heights
 from ..record import Record
 from .change_kinds import KINDS
 from .filtered_signal import averaged, derivatives, filtered
@@ -86,13 +87,6 @@ class ChangeablePrediction:
         return self.known[id(signal)]
 
 
-def loop_numbers(model: Model) -> dict[str, float]:
-    """Parameters that together determine the height of the loop, with their values."""
-    values = model.values()
-    names = [f"{effect.name}.{number}" for effect in model.effects for number in effect.loop_numbers()]
-    return {name: values[name] for name in names if values[name]}
-
-
 def creep_numbers(model: Model) -> dict[str, float]:
     """Parameters that together determine the rate of creep, with their values."""
     values = model.values()
@@ -114,7 +108,7 @@ def predictions(model: Model, records: Sequence[Record]) -> tuple[list[Changeabl
         If the model diverges.
     """
     bare = model.without(Offset.name) if Offset.name in model else model
-    loop, creep = loop_numbers(bare), creep_numbers(bare)
+    loop, creep = loop_heights(bare), creep_numbers(bare)
     resonance = [f"{ExtraResonance.name}.f0"] if ExtraResonance.name in bare else []
     before_loop = _slopes_of_amplifier(bare)
     wanted = [*loop, *creep, *resonance, *before_loop]

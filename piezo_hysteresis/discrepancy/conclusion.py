@@ -105,7 +105,10 @@ def concluded(
     missing = missing_excitation(setup.records, setup.usable, found)
     models = first.stated_model if given is None else given, delivered
     noted, said = experiment.noting(*missing), (conclusion, reason)
-    answer = answered(noted, said, models, given, fit, gap, selection, setup.training_data, where)
+    everywhere = None
+    with suppress(DivergenceError):
+        everywhere = gap_of(delivered, delivered, setup.usable, offset=given is not None)
+    answer = answered(noted, said, models, given, fit, (gap, everywhere), selection, setup.training_data, where)
     return replace(answer, correction=best_correction(final.model, setup, experiment)) if is_unexplained else answer
 
 
@@ -115,7 +118,7 @@ def answered(
     models: tuple[Model, Model],
     given: Model | None,
     fit: Fit | None,
-    gap: Gap,
+    gaps: tuple[Gap, Gap | None],
     selection: Selection,
     training_data: TrainingData,
     where: tuple[ResidualShare, ...],
@@ -123,14 +126,15 @@ def answered(
     """The answer of a search, with the next experiment.
 
     `said` is the conclusion and its reason. The model after states this experiment as its origin, and its errors on it,
-    unless it is the `given` one.
+    unless it is the `given` one. `gaps` are the gap, and that on all records if it was measured on some of them.
     """
     conclusion, reason = said
+    gap, everywhere = gaps
     before, after = models
     return Diagnosis(
         conclusion=conclusion,
         reason=reason,
-        model=after if after is given else gap.stated_by(after, experiment),
+        model=after if after is given else gap.stated_by(after, experiment, everywhere),
         baseline=before,
         selection=selection,
         fit=fit,

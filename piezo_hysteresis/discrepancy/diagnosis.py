@@ -108,6 +108,8 @@ class Diagnosis(Pictured):
                 name, closed = step.best.name, f"{100 * self.selection.explained(step.best.score):.0f} % of the gap"
                 kept = f"it is in the model but not named: up to it, {closed} are explained"
                 closest = f"it is the closest effect, but explains only {closed}"
+                if step is not self.selection.steps[0]:
+                    closest = f"with the effects before it, it explains only {closed}"
                 rejections[name] = Rejection(name, kept if self.model is not None and name in self.model else closest)
             for rejection in step.rejected:
                 rejections[rejection.name] = rejection
@@ -175,8 +177,9 @@ class Diagnosis(Pictured):
             closed = 100 * row["explained_fraction"]
             lines.append(f"  {row['name']} ({row['family']}): explains {closed:.0f} % of the gap")
             for name, p in row["parameters"].items():
-                low, high = p["interval_95"]
-                lines.append(f"    {name} = {p['value']:.4g} {p['unit']} (95 %: {low:.4g} to {high:.4g})")
+                ends = p["interval_95"]
+                known = f"95 %: {ends[0]:.4g} to {ends[1]:.4g}" if ends else "not fitted"
+                lines.append(f"    {name} = {p['value']:.4g} {p['unit']} ({known})")
             if row["confusable_with"]:
                 lines.append(f"    the data cannot distinguish it from {', '.join(row['confusable_with'])}")
         if self.gap is not None:
@@ -201,7 +204,7 @@ def _parameters(fit: Fit, effect: str) -> dict[str, dict[str, Any]]:
         owner, _, parameter = name.partition(".")
         row = fit.model.row(name)
         if owner == effect and not row.fixed and not row.per_record:
-            ends = fit.interval(name) if name in fit.names else (value, value)
-            interval = [min(max(end, row.lower), row.upper) for end in ends]
+            ends = fit.interval(name) if name in fit.names else None  # an assumed number has no interval
+            interval = None if ends is None else [min(max(end, row.lower), row.upper) for end in ends]
             rows[parameter] = {"value": value, "interval_95": interval, "unit": row.unit}
     return rows

@@ -91,10 +91,13 @@ class Gap:
         """Share X of the gap that the extended model explains: 1 − √((V_after − 1)/(V_before − 1)), between 0 and 1."""
         return explained(*self._squares, 1.0)
 
-    def stated_by(self, model: Model, experiment: Experiment) -> Model:
-        """The extended model with the experiment as its origin, and with its errors on these records."""
-        after = [p.after for p in self.per_phase]
-        moving = [p.after for p in self.per_phase if moves(experiment[p.index])]
+    def stated_by(self, model: Model, experiment: Experiment, everywhere: Gap | None = None) -> Model:
+        """The extended model with the experiment as its origin, and with its errors.
+
+        `everywhere` is the gap on all records that are compared with the model; by default, this is it.
+        """
+        rows = (everywhere or self).per_phase
+        after, moving = [p.after for p in rows], [p.after for p in rows if moves(experiment[p.index])]
         mean = float(np.sqrt(np.mean(np.square(moving or after))))
         errors = (0.01 * experiment.range * max(error, self.live) for error in (max(after), mean))
         return with_origin(model, experiment, self.live, *errors)

@@ -102,7 +102,7 @@ def _fit_sentences(comparison: ModelComparison, now: Errors) -> tuple[str, ...]:
 def floor_sentence(comparison: ModelComparison, now: Errors) -> str:
     """Whether the error is at the noise floor; if not, where it is farthest above it."""
     if is_at_floor(comparison, now):
-        return "This error is at the noise floor: only noise remains."
+        return "This error is at the noise floor."
     worst = max(now.judged, key=lambda row: row.rms / comparison.floors[row.index])
     times = worst.rms / comparison.floors[worst.index]
     return f"The error is largest in {worst.phase}: {worst.percent:.3g} % of range, {times:.3g} times its noise floor."

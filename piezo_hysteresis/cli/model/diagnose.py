@@ -57,7 +57,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         type=float,
         default=float("inf"),
         metavar="S",
-        help="time after which the search ends with the best answer so far [s] (default: no limit)",
+        help="time after which the search ends with the best answer so far [s] (default: no limit); the model that it "
+        "begins with and the last fit are not limited",
     )
     parser.add_argument(
         "--explicit-step",
@@ -118,9 +119,9 @@ def _save_corrected(found: Diagnosis, path: str | None) -> str:
 
 
 def _of_stage(args: argparse.Namespace) -> LiveDiagnosis:
-    if args.experiment or args.model is not None or args.explicit_step:
+    if args.experiment or args.model is not None or args.explicit_step or args.time < float("inf"):
         raise ParameterError(
-            "diagnose: got --stage beside a recording, a model or --explicit-step, expected --stage alone"
+            "diagnose: got --stage beside a recording, a model, --time or --explicit-step, expected --stage alone"
         )
     for option, path in (("--report", args.report), ("--json", args.json), ("--correction", args.correction)):
         require_new_file(option, path, args.force)
@@ -130,6 +131,8 @@ def _of_stage(args: argparse.Namespace) -> LiveDiagnosis:
 def _of_recording(args: argparse.Namespace) -> Diagnosis:
     if not args.experiment:
         raise ParameterError("diagnose: got no recording, expected one or several, or --stage FILE")
+    if not args.time > 0.0:
+        raise ParameterError(f"diagnose: got --time {args.time:g}, expected more than 0 s")
     require_new_results(args)
     require_new_file("--correction", args.correction, args.force)
     for path in filter(None, (args.output, args.correction)):

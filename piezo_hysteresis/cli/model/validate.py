@@ -80,10 +80,10 @@ def run(args: argparse.Namespace) -> int:
     show_notices((*experiment.notices, *conditioned, *beyond))
     if args.figures is not None:
         console().print(f"wrote figures to {args.figures}")
-    left = _left(tests)
-    if describes(now.percent) and not (left and is_at_floor(comparison, now)):
+    left, grown = _left(tests), _grown(model, now, bool(beyond))
+    if describes(now.percent) and not ((left or grown) and is_at_floor(comparison, now)):
         left = f" {floor_sentence(comparison, now)}{left}"
-    verdict = f"{error_sentence(now.percent)}{_grown(model, now, bool(beyond))}{left}{_caveats(experiment)}"
+    verdict = f"{error_sentence(now.percent)}{grown}{left}{_caveats(experiment)}"
     console().print(f"Verdict: {verdict}", style="bold")
     severe = any(notice.severe for notice in (*experiment.notices, *conditioned))
     return 0 if describes(now.percent) and not severe else 1

@@ -182,7 +182,7 @@ def _with_factor(model: Model, factor: Sequence[float] | Array) -> Model:
 
 def _lead(without: PieceFit, found: PieceFit) -> float:
     """ln of the factor by which a ringing mode lowers the cost; 0 without such a mode."""
-    return float(np.log(without.cost / found.cost)) if set(SHAPE) & set(found.names) else 0.0
+    return float(np.log(without.cost / found.cost)) if set(SHAPE) <= set(found.names) else 0.0
 
 
 def _with_two_more_orders(

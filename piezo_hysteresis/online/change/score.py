@@ -88,15 +88,10 @@ class ChangeScore:
 
 
 def loop_heights(model: Model) -> dict[str, float]:
-    """Values of the parameters that scale the height of the hysteresis loop, by `effect.parameter`; empty without one.
-
-    A parameter that acts on the output in proportion, without hysteresis, is left out.
-    """
-    if not model.has_hysteresis:
-        return {}
-    loop, values = model.hysteresis, model.values()
-    linear = loop.linear_numbers()
-    return {f"{loop.name}.{n}": values[f"{loop.name}.{n}"] for n in loop.gain_numbers() if n not in linear}
+    """Values of the parameters that together scale the height of the hysteresis loop, by `effect.parameter`."""
+    values = model.values()
+    names = [f"{effect.name}.{number}" for effect in model.effects for number in effect.loop_numbers()]
+    return {name: values[name] for name in names if values[name]}
 
 
 def block_size(sample_period: float) -> int:

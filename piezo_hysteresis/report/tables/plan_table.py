@@ -19,7 +19,10 @@ from __future__ import annotations
 from typing import Any
 
 from ...compensation.plan import Plan
+from ...identification.identified_range import outside_of
+from ...model.model import Model
 from ...parameter import slew_text
+from ...record import Record
 from ..words import nanometre
 from .table import Table
 
@@ -51,14 +54,16 @@ def plan_table(found: Plan) -> Table:
     return Table("Plan", ("quantity", "value"), rows)
 
 
-def notes(found: Plan) -> list[str]:
-    """Notes on the plan: effects that were left out, and unreachable parts."""
+def notes(found: Plan, model: Model) -> list[str]:
+    """Notes on the plan: where it leaves what the model was identified on, effects left out, and unreachable parts."""
     lines = [
         f"caution: {name} has no inverse and was left out; the error above includes the effect of this"
         for name in found.left_out
     ]
     lines += [f"note: {name} does not depend on the drive and is not compensated" for name in found.not_on_path]
-    return [*lines, *(f"caution: {line}" for line in refusal(found))]
+    drive = Record(found.voltage, found.voltage, found.sample_period, initial_voltage=float(found.voltage[0]))
+    beyond = [f"caution: {said.message}; the error may be larger there" for said in outside_of(model, drive)]
+    return [*beyond, *lines, *(f"caution: {line}" for line in refusal(found))]
 
 
 def refusal(found: Plan) -> list[str]:

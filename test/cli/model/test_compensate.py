@@ -23,9 +23,11 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.effects import Arx, BoucWen, SofteningOfOneMode
+from piezo_hysteresis.identification.identified_range import identified_range
 from piezo_hysteresis.model import model_file
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.parameter import slew_text
+from piezo_hysteresis.record import Record
 from piezo_hysteresis.report.words import nanometre
 
 PERIOD = 2e-5
@@ -60,6 +62,18 @@ def test_the_command_drives_the_model_along_the_path(piezo, model, tmp_path):
     assert np.sqrt(np.mean(off**2)) == pytest.approx(answer["expected_error"]["planned_m"])
     assert answer["expected_error"]["free_run_m"] == 5e-9 and answer["reachable"] is True
     assert "expected error" in done.out and (tmp_path / "figures" / "tracking.png").stat().st_size > 5000
+
+
+def test_a_path_outside_of_what_the_model_was_identified_on_is_told(piezo, tmp_path):
+    """The expected error was that of the data of the model: 0.06 % of the range, and 1 % in the end."""
+    known = Record(*2 * (5.0 * np.sin(2.0 * np.pi * np.arange(500_000) * PERIOD),), PERIOD)
+    stated = replace(MODEL, provenance={**MODEL.provenance, **identified_range((known,), (0,))})
+    place = model_file.save(stated, tmp_path / "slow.yaml")
+    write(tmp_path / "path.csv", 1.0, 3.0)
+    words = ("compensate", place, tmp_path / "path.csv", "-o", tmp_path / "command.npz")
+    done = piezo(*words, "--report", tmp_path / "page.html")
+    assert "the model was identified up to" in done.out
+    assert "the model was identified up to" in (tmp_path / "page.html").read_text()
 
 
 def test_terminal_page_and_json_contain_the_same_numbers(piezo, model, tmp_path):

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from piezo_hysteresis.effects import Arx, BoucWen, Creep
+from piezo_hysteresis.effects import Arx, BoucWen, Creep, HysteresisMemory
 from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.model_parameters import model_hash
@@ -51,11 +51,11 @@ def sine(seconds, frequency=11.0, amplitude=2.5):
     return 3.5 + amplitude * np.sin(2 * np.pi * frequency * time) * (time > 0.2)
 
 
-def follow(drive, displacement, seed=0, baseline=None, noise=5e-4):
+def follow(drive, displacement, seed=0, baseline=None, noise=5e-4, model=MODEL):
     """The watch after a stream, and the largest statistic after the baseline."""
     rng = np.random.default_rng(seed)
     measured = displacement + noise * SPAN * rng.standard_normal(displacement.size)
-    predictor, watch = Predictor(PERIOD, MODEL), ChangeWatch(3600.0, baseline)
+    predictor, watch = Predictor(PERIOD, model), ChangeWatch(3600.0, baseline)
     largest = 0.0
     for first in range(0, drive.size - BLOCK + 1, BLOCK):
         part = slice(first, first + BLOCK)
@@ -134,6 +134,17 @@ def test_a_change_is_found_with_its_group_and_its_onset(drive, group):
     assert watch.change.statistic > 1.0
     assert group in watch.change.groups
     assert abs(watch.since * 1e-9 - late * PERIOD) < 1.0
+
+
+def test_the_loop_of_play_operators_is_watched(drive):
+    """A model that `identify` finds without broadband records has no other loop."""
+    plays = HysteresisMemory(c=(0.05,) * 6, reach=0.6, virgin=1.0)
+    model = MODEL.with_hysteresis(BoucWen().memoryless()).with_effect(plays)
+    other = model.with_effect(plays.with_values(c=(0.055,) * 6))
+    late = np.arange(drive.size) >= drive.size - round(WATCHED / 2 / PERIOD)
+    watch, _ = follow(drive, np.where(late, run(other, drive), run(model, drive)), model=model)
+    assert watch.alarms == 1
+    assert "loop" in watch.change.groups
 
 
 def test_the_estimate_of_a_gain_lies_within_its_interval(drive):
