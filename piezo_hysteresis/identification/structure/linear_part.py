@@ -29,7 +29,7 @@ from .pole_place import LinearPart, in_every_place, real_poles, with_pole
 from .ringing import decay_after_steps, ringing_lines, sampled_decay
 from .step_edge import with_slew_limit
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
-from .structure_fit import SETTLED, fit_from_best, fit_structure, is_settled, misfit_of
+from .structure_fit import SETTLED, fit_structure, is_settled, misfit_of
 
 LAGS = (0.3, 1.5, 4.0)
 """Start values of the delay [samples]."""
@@ -71,7 +71,8 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
         Floor of every record [m].
     """
     lags = (*LAGS, *_late_responses(pieces))
-    plain = fit_from_best([model.with_values({DELAY: lag}) for lag in lags], pieces, floors)
+    found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in lags]
+    plain = min(found, key=lambda f: f.cost)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
     start = best
     late = limited = with_slew_limit(best, pieces, floors)

@@ -27,7 +27,7 @@ from ...record import Notice
 from .mode import held_by
 from .piece_fit import PieceFit, linearised
 from .pieces import Kind, RecordPiece
-from .structure_fit import fit_from_best, fit_structure, is_settled
+from .structure_fit import FEW, fit_structure, is_settled
 
 RISES = (1.1, 1.5, 2.0, 3.0, 4.0, 6.0)
 """Start values of the rise time of the largest step [samples]."""
@@ -41,9 +41,10 @@ def with_slew_limit(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequ
         return found
     limits = (AmplifierSlewLimitHeld(S=height / (rise * found.model.sample_period)) for rise in RISES)
     models, held = [found.model.with_effect(limit) for limit in limits], held_by(found)
-    if not is_settled(found, pieces):
-        return fit_from_best(models, pieces, floors, held)
-    starts = [PieceFit(m, (), *linearised(m, pieces, floors, ())) for m in models]
+    if is_settled(found, pieces):
+        starts = [PieceFit(m, (), *linearised(m, pieces, floors, ())) for m in models]
+    else:
+        starts = [fit_structure(m, pieces, floors, held, FEW) for m in models]
     return fit_structure(min(starts, key=lambda f: f.cost).model, pieces, floors, held)
 
 

@@ -26,7 +26,7 @@ from .piece_fit import GAIN, MOST, PieceFit, fit_pieces
 from .pieces import Kind, RecordPiece
 
 FEW = 4
-"""Number of linearisations after which the best start is known."""
+"""Number of linearisations after which the best start of a mode or a slope is known."""
 SETTLED = 4.0
 """Mean square misfit after a step [floors²] up to which nothing else is tried."""
 
@@ -49,14 +49,6 @@ def fit_structure(
 ) -> PieceFit:
     """Fit all free parameters of a model except those in `held`."""
     return fit_pieces(model, pieces, floors, [n for n in free_numbers(model) if n not in held], max_iterations)
-
-
-def fit_from_best(
-    models: Sequence[Model], pieces: Sequence[RecordPiece], floors: Sequence[float], held: Collection[str] = ()
-) -> PieceFit:
-    """The fit from the start that is the best one after few linearisations."""
-    begun = [fit_structure(model, pieces, floors, held, FEW) for model in models]
-    return fit_structure(min(begun, key=lambda f: f.cost).model, pieces, floors, held)
 
 
 def misfit_of(kind: Kind, fit: PieceFit, pieces: Sequence[RecordPiece]) -> float:
