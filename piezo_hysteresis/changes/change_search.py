@@ -239,8 +239,8 @@ class ChangeSearch:
     def halves(self, best: Account) -> Array:
         """Half 95 % jackknife intervals of the size, of gain and of loop height.
 
-        Groups of pieces or records are left out, and the wider one counts.
-        A part without which little of the change remains is not used.
+        Groups of pieces or records are left out, and the wider one counts. A part without which little of the change
+        remains is not used, nor for gain and loop height what hardly shows them: they would be those of the prior.
         """
         numbers = np.unique(self.labels)
         groups = [g for g in np.array_split(numbers, min(6, numbers.size)) if g.size]
@@ -251,9 +251,12 @@ class ChangeSearch:
             masks = [~np.isin(labels, part) for part in parts]
             found = [(self.account("none", mask=m).cost, self.best(best.key, m, near)) for m in masks if m.any()]
             kept = [rest for without, rest in found if without - rest.cost > SHOWN * whole]
-            count = len(kept)
-            if count > 1:
-                sizes = np.array([[rest.size, *(rest.own[n] for n in self.sides)] for rest in kept])
-                spread = np.sqrt((count - 1.0) / count * np.sum((sizes - sizes.mean(axis=0)) ** 2, axis=0))
-                half = np.maximum(half, float(scipy.stats.t.ppf(0.975, count - 1)) * spread)
+            sizes = [[rest.size for rest in kept]]
+            for at, name in enumerate(self.sides):  # the first parameters of every account
+                least = SHOWN**0.5 * best.scale[at]
+                sizes.append([rest.own[name] for rest in kept if least < rest.scale[at] < np.inf])
+            for k, values in enumerate(sizes):
+                if (count := len(values)) > 1:
+                    spread = float(np.sqrt((count - 1.0) ** 2 / count) * np.std(values, ddof=1))
+                    half[k] = max(half[k], float(scipy.stats.t.ppf(0.975, count - 1)) * spread)
         return np.where(half > 0.0, half, np.inf)

@@ -338,6 +338,20 @@ def test_gain_and_loop_height_that_both_have_changed_are_both_stated(model, anot
     assert not change.rivals
 
 
+def test_a_gain_beside_a_lag_is_known_from_one_sine_and_the_step_before_it():
+    """The step alone hardly shows the gain: without the sine, the usual gain counted as a measured one."""
+
+    def parts(stage, *frequencies):
+        whole = [(r, int(np.flatnonzero(np.diff(r.voltage))[0]) + 1) for r in played(stage, frequencies)]
+        return Experiment(tuple(part for r, first in whole for part in r.split(first)))
+
+    stage = replace(STAGE, pole=2e-5, filter_pole=1e-3)
+    later = replace(stage, gain=1.03 * stage.gain, filter_delay=2.0 * PERIOD, noise_seed=4)
+    found = recalibrate(identify(parts(stage, 1.0, 10.0), memory=True).model, parts(later, 10.0))
+    low, high = found.intervals_95["gain"]
+    assert low < 0.03 < high < low + 0.02
+
+
 def test_the_known_error_is_compared_in_its_own_measure(model):
     """The error that a model states is a mean over records of equal weight, and so is the error it is compared with."""
     seen = played(replace(STAGE, noise_seed=1))
