@@ -195,13 +195,13 @@ class ChangeSearch:
         return change if name != "loop" else change * (1.0 - self.loop_share) / (1.0 + self.loop_share * change)
 
     def of_equal_records(self, account: Account, floors: Sequence[float]) -> float:
-        """V that an account without change leaves, with equal weights of the records; `floors` of the used records [m].
+        """V that an account without change leaves, with equal weights of the records; `floors` of all records [m].
 
         A model states its error with these weights.
         """
         left = self._left(account, np.ones(self.measured.size))
         power = np.add.reduceat(left**2, np.cumsum([0, *self.sizes[:-1]])) / self.sizes
-        return float(np.mean(power) / np.mean(np.square(floors)))
+        return float(np.mean(power) / np.mean([floors[i] ** 2 for i in self.used]))
 
     def shaped(
         self,
@@ -257,6 +257,6 @@ class ChangeSearch:
                 sizes.append([rest.own[name] for rest in kept if least < rest.scale[at] < np.inf])
             for k, values in enumerate(sizes):
                 if (count := len(values)) > 1:
-                    spread = float(np.sqrt((count - 1.0) ** 2 / count) * np.std(values, ddof=1))
+                    spread = (count - 1) * float(scipy.stats.sem(values))
                     half[k] = max(half[k], float(scipy.stats.t.ppf(0.975, count - 1)) * spread)
         return np.where(half > 0.0, half, np.inf)

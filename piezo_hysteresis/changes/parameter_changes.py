@@ -88,7 +88,7 @@ def find_change(
     """
     search = ChangeSearch(model, records, used, floors)
     day = search.account("none")
-    if _error_ratio(search, day, floors) ** 2 + day.cost - day.left <= ADEQUATE:
+    if search.of_equal_records(day, floors) + day.cost - day.left <= ADEQUATE:
         return None
     keys = [k for k, kind in KINDS.items() if k in SHAPES or (kind.rows and kind.rows[0] in search.predicted[0].rows)]
     first = [k for k in (*search.sides, *keys) if k not in (*SECOND_ORDER, "low_pass_before")]
@@ -164,11 +164,7 @@ def error_ratio(model: Model, records: Sequence[Record], used: Sequence[int], fl
     to have changed, and a small change may be hidden.
     """
     search = ChangeSearch(model, records, used, floors)
-    return _error_ratio(search, search.account("none"), floors)
-
-
-def _error_ratio(search: ChangeSearch, day: Account, floors: Sequence[float]) -> float:
-    return float(np.sqrt(search.of_equal_records(day, [floors[i] for i in search.used])))
+    return float(np.sqrt(search.of_equal_records(search.account("none"), floors)))
 
 
 def _filters_of_second_order(search: ChangeSearch) -> list[Account]:

@@ -106,8 +106,9 @@ def concluded(
     models = first.stated_model if given is None else given, delivered
     noted, said = experiment.noting(*missing), (conclusion, reason)
     everywhere = None
-    with suppress(DivergenceError):
-        everywhere = gap_of(delivered, delivered, setup.usable, offset=given is not None)
+    if delivered is not given and len(tested) < len(setup.usable):
+        with suppress(DivergenceError):
+            everywhere = gap_of(delivered, delivered, setup.usable, offset=given is not None)
     answer = answered(noted, said, models, given, fit, (gap, everywhere), selection, setup.training_data, where)
     return replace(answer, correction=best_correction(final.model, setup, experiment)) if is_unexplained else answer
 

@@ -166,7 +166,8 @@ def measure_gap(
         left = residuals_on(model, records, chosen, nuisance)
         return np.array([100.0 * float(np.sqrt(np.mean(e**2))) / stroke for e in left])
 
-    before, after = (left_by(model, free_per_record(model, offset=offset)) for model in models)
+    before = left_by(models[0], free_per_record(models[0], offset=offset))
+    after = before if models[1] is models[0] else left_by(models[1], free_per_record(models[1], offset=offset))
     live = left_by(models[1], Nuisance(offset)) if MainsHum.name in models[1] else after
     least = 100.0 * np.array([floors[i] for i in chosen]) / stroke
     squares = after**2

@@ -142,7 +142,10 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     missing = missing_excitation(records, used, shown)
     origin = CHOSEN if found else REFITTED if final.fit is not None else KEPT
     said = conclusion_of_few(selection, is_certain, before, gap, len(used), several, missing, origin)
-    everywhere = measure_gap((final.model, final.model), records, used, least.tolist(), span, unseen=False, offset=True)
+    everywhere = None
+    if aside and final.model is not model:
+        both_new = final.model, final.model
+        everywhere = measure_gap(both_new, records, used, least.tolist(), span, unseen=False, offset=True)
     gaps, noted = (gap, everywhere), experiment.noting(*missing)
     return answered(noted, said, both, model, final.fit, gaps, selection, training_data, where)
 

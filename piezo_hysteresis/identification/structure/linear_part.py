@@ -74,17 +74,18 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     found = [fit_structure(model.with_values({DELAY: lag}), pieces, floors) for lag in lags]
     plain = min(found, key=lambda f: f.cost)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
-    start = best
-    late = limited = with_slew_limit(best, pieces, floors)
+    start, late, refused = best, with_slew_limit(best, pieces, floors), list[PieceFit]()
     if not is_settled(best, pieces):
         limited, its_lead = _behind_slew_limit(plain, late, lead, pieces, floors)
         if max(_shares_left(limited, best, pieces)) < SECOND:
             best, lead = limited, its_lead
+        else:
+            refused.append(limited)
     best = _with_second_mode(best, pieces, floors)
     best, *others = in_every_place(best, pieces, floors)
     if AmplifierSlewLimitHeld.name not in best.model:
         # it may be as likely as a pole or a delay
-        others += [limited, late if best is start else with_slew_limit(best, pieces, floors)]
+        others += [*refused, late if best is start else with_slew_limit(best, pieces, floors)]
     fast = _with_two_more_orders(plain, best, pieces, floors)
     if fast is not best:
         return LinearPart(fast, 0.0)
