@@ -35,7 +35,7 @@ from .search.refit import LAST, PRECISE, joint, restart
 from .search.selection_result import Selection
 from .search.training_data import TrainingData
 from .unnamed.offer import best_correction
-from .verdict import Conclusion, Verdict, conclusion_of, is_explained
+from .verdict import Conclusion, Verdict, is_explained, named_conclusion, unnamed_conclusion
 
 NOISY, WORTHWHILE = 1.1, 0.95
 """Ratio of the cost to the cost of noise above which the last fit is restarted, and largest ratio of the new cost to
@@ -68,9 +68,11 @@ def concluded(
     def gap_of(before: Model, after: Model, chosen: Sequence[int], *, offset: bool = False) -> Gap:
         unseen = chosen is setup.test_records
         both, least = (before, after), setup.least.tolist()
-        return measure_gap(both, setup.records, chosen, least, setup.span, unseen=unseen, offset=offset)
+        return measure_gap(
+            both, setup.records, chosen, least, setup.span, unseen=unseen, offset=offset, between=between
+        )
 
-    tested = setup.test_records or setup.fitted
+    tested, between = setup.test_records or setup.fitted, selection.models_between
     named = is_explained(selection)
     falls = diverges = False
     if named:
@@ -79,7 +81,7 @@ def concluded(
             gap = gap_of(first.model, final.model, tested)
             falls = gap.falls
     if not falls:
-        final = first
+        final, between = first, ()
         try:
             gap = gap_of(first.model, first.model, tested)
         except DivergenceError:
@@ -89,9 +91,9 @@ def concluded(
     final = with_form_uncertainty(final, whole.records, free, whole.floors, noise, setup.span)
     progress("next experiment", 0.95)
     if diverges:
-        conclusion, reason = Conclusion.INSUFFICIENT_DATA, DIVERGES
-    else:
-        conclusion, reason = conclusion_of(selection, falls, falls or not named, gap)
+        said = Conclusion.INSUFFICIENT_DATA, DIVERGES
+    elif not falls:
+        said = unnamed_conclusion(selection, not named, gap)
     delivered = final.stated_model
     fit: Fit | None = final
     if given is not None:
@@ -100,12 +102,13 @@ def concluded(
             if not falls and gap.after > gap.before:  # a refit that names nothing must not predict worse
                 delivered, fit = given, None
                 gap = gap_of(given, given, tested, offset=True)
-    is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
+    if falls:
+        said = named_conclusion(selection, gap)
+    is_unexplained = said[0].verdict is Verdict.UNKNOWN and selection.in_time and not diverges
     found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
     missing = missing_excitation(setup.records, setup.usable, found)
     models = first.stated_model if given is None else given, delivered
-    noted, said = experiment.noting(*missing), (conclusion, reason)
-    everywhere = None
+    noted, everywhere = experiment.noting(*missing), None
     if delivered is not given and len(tested) < len(setup.usable):
         with suppress(DivergenceError):
             everywhere = gap_of(delivered, delivered, setup.usable, offset=given is not None)

@@ -103,14 +103,17 @@ class Diagnosis(Pictured):
         if self.selection is None:
             return ()
         rejections: dict[str, Rejection] = {}
-        for step in self.selection.steps:
+        shares = () if self.gap is None else self.gap.shares
+        for k, step in enumerate(self.selection.steps):
             if self.verdict is Verdict.UNKNOWN and step.accepted:
-                name, closed = step.best.name, f"{100 * self.selection.explained(step.best.score):.0f} % of the gap"
-                kept = f"it is in the model but not named: up to it, {closed} are explained"
-                closest = f"it is the closest effect, but explains only {closed}"
-                if step is not self.selection.steps[0]:
-                    closest = f"with the effects before it, it explains only {closed}"
-                rejections[name] = Rejection(name, kept if self.model is not None and name in self.model else closest)
+                name, closed = step.best.name, 100 * self.selection.explained(step.best.score)
+                reason = f"it is the closest effect, but explains only {closed:.0f} % of the gap"
+                if k:
+                    reason = f"with the effects before it, it explains only {closed:.0f} % of the gap"
+                if self.model is not None and name in self.model:
+                    share = f"{100 * shares[k]:.0f} % of the gap"
+                    reason = f"it is in the model but not named: up to it, {share} are explained"
+                rejections[name] = Rejection(name, reason)
             for rejection in step.rejected:
                 rejections[rejection.name] = rejection
         forms = {e.name for e in CHAIN if e.public_name() in self.names}
@@ -120,10 +123,10 @@ class Diagnosis(Pictured):
         """The named effects, as in ``answer.json``."""
         if self.change is not None and self.gap is not None:
             return self.change.rows(self.gap.explained)
-        if self.verdict is not Verdict.NAMED or self.selection is None or self.fit is None:
+        if self.verdict is not Verdict.NAMED or self.selection is None or self.fit is None or self.gap is None:
             return []
         rows = []
-        for step in self.selection.accepted:
+        for step, share in zip(self.selection.accepted, self.gap.shares, strict=True):
             effect = self.fit.model[step.best.name]
             rows.append(
                 {
@@ -132,7 +135,7 @@ class Diagnosis(Pictured):
                     "family": effect.family,
                     "predicted_live": effect.is_predicted_live(),
                     "member_certain": step.member_certain,
-                    "explained_fraction": round(self.selection.explained(step.best.score), 4),
+                    "explained_fraction": round(share, 4),
                     "parameters": _parameters(self.fit, effect.name),
                     "confusable_with": list(step.confusable_with),
                     "held_out_gain": round(step.before.cost - step.best.score.cost, 4),

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +26,7 @@ import scipy
 
 from ..blocks.block import Array
 from ..effects import MainsHum
+from ..errors import DivergenceError
 from ..identification.fit.normal_equations import Nuisance
 from ..identification.free_run_error import free_per_record, residuals_on
 from ..identification.records.excitation_check import moves
@@ -66,6 +68,8 @@ class Gap:
     live : float
         Expected error of the extended model in live prediction [% of range]: without the numbers that are fitted to
         each record. It differs from `after` only for effects that are not predicted live.
+    between : tuple of float
+        V of the model up to each named effect but the last.
     """
 
     before: float
@@ -75,6 +79,7 @@ class Gap:
     per_phase: tuple[PhaseGap, ...]
     unseen: bool
     live: float
+    between: tuple[float, ...] = ()
 
     @property
     def falls(self) -> bool:
@@ -89,7 +94,13 @@ class Gap:
     @property
     def explained(self) -> float:
         """Share X of the gap that the extended model explains: 1 − √((V_after − 1)/(V_before − 1)), between 0 and 1."""
-        return explained(*self._squares, 1.0)
+        return self.shares[-1]
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Share X of the gap that the model up to each named effect explains; the last is that of the extended model."""
+        before, after = self._squares
+        return tuple(explained(before, square, 1.0) for square in (*self.between, after))
 
     def stated_by(self, model: Model, experiment: Experiment, everywhere: Gap | None = None) -> Model:
         """The extended model with the experiment as its origin, and with its errors.
@@ -136,6 +147,7 @@ def measure_gap(
     *,
     unseen: bool,
     offset: bool = False,
+    between: Sequence[Model] = (),
 ) -> Gap:
     """Compare two models on the records `chosen`.
 
@@ -155,6 +167,8 @@ def measure_gap(
         Whether the chosen records were used neither for fitting nor for choosing.
     offset : bool
         Whether the sensor zero is free in every record. The hum of a model with hum always is.
+    between : sequence of Model
+        The models up to each named effect but the last. One that diverges explains nothing.
 
     Raises
     ------
@@ -162,14 +176,19 @@ def measure_gap(
         If a model diverges on one of the chosen records, or on one that it continues.
     """
 
-    def left_by(model: Model, nuisance: Nuisance) -> Array:
-        left = residuals_on(model, records, chosen, nuisance)
+    def left_by(model: Model, nuisance: Nuisance | None = None) -> Array:
+        left = residuals_on(model, records, chosen, nuisance or free_per_record(model, offset=offset))
         return np.array([100.0 * float(np.sqrt(np.mean(e**2))) / stroke for e in left])
 
-    before = left_by(models[0], free_per_record(models[0], offset=offset))
-    after = before if models[1] is models[0] else left_by(models[1], free_per_record(models[1], offset=offset))
-    live = left_by(models[1], Nuisance(offset)) if MainsHum.name in models[1] else after
     least = 100.0 * np.array([floors[i] for i in chosen]) / stroke
+    before = left_by(models[0])
+    after = before if models[1] is models[0] else left_by(models[1])
+    live = left_by(models[1], Nuisance(offset)) if MainsHum.name in models[1] else after
+    partial = []
+    for model in between:
+        partial.append(np.inf)
+        with suppress(DivergenceError):
+            partial[-1] = float(np.mean((left_by(model) / least) ** 2))
     squares = after**2
     mean, interval = float(squares.mean()), None
     if squares.size > 1:
@@ -186,4 +205,5 @@ def measure_gap(
         ),
         unseen=unseen,
         live=float(np.sqrt(np.mean(np.square(live)))),
+        between=tuple(partial),
     )

@@ -52,7 +52,14 @@ from .search.selection import select
 from .search.selection_result import Selection, Step
 from .search.structure_steps import structure_steps
 from .search.training_data import choose_test_records
-from .verdict import FEWEST_RECORDS, MORE_MAY_BE_MISSING, Conclusion, conclusion_of, is_explained
+from .verdict import (
+    FEWEST_RECORDS,
+    MORE_MAY_BE_MISSING,
+    Conclusion,
+    is_explained,
+    named_conclusion,
+    unnamed_conclusion,
+)
 
 SHARP = 1e-6
 """Relative decrease of the cost at convergence of the baseline: few records take little time."""
@@ -136,8 +143,8 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
 
     progress("gap", 0.9)
     first = model or baseline.model  # the gap of a given model is measured before any refit
-    both = first, final.model
-    gap = measure_gap(both, records, chosen, least.tolist(), span, unseen=bool(aside), offset=True)
+    both, between = (first, final.model), selection.models_between
+    gap = measure_gap(both, records, chosen, least.tolist(), span, unseen=bool(aside), offset=True, between=between)
     shown = {s.best.effect.public_name() for s in selection.accepted}
     missing = missing_excitation(records, used, shown)
     origin = CHOSEN if found else REFITTED if final.fit is not None else KEPT
@@ -190,10 +197,12 @@ def conclusion_of_few(
     """
     named = gap.falls and (decided or (count >= FEWEST_RECORDS and several and is_explained(selection)))
     if not selection.in_time and not named:
-        return conclusion_of(selection, named, gap.falls, gap)
+        return unnamed_conclusion(selection, gap.falls, gap)
     closed = f"{100 * gap.explained:.0f} %"
     names = [s.best.effect.public_name() for s in selection.accepted]
-    if decided and named:
+    if named and not decided:
+        return named_conclusion(selection, gap)
+    if named:
         alike = [(s.best.effect.public_name(), s.confusable_with) for s in selection.accepted if s.confusable_with]
         said = (
             f"The model does not contain {' and '.join(names)}. An extended model predicts rates, amplitudes and "
@@ -203,8 +212,8 @@ def conclusion_of_few(
         return Conclusion.MISSING_EFFECT, said + ("" if selection.in_time else MORE_MAY_BE_MISSING)
     is_adequate = before.excess <= ADEQUATE
     if count >= FEWEST_RECORDS and not decided and (several or is_adequate):
-        judged = replace(gap, after=gap.before) if is_adequate and not named else gap  # of the published model
-        conclusion, reason = conclusion_of(selection, named, gap.falls, judged)
+        judged = replace(gap, after=gap.before) if is_adequate else gap  # of the published model
+        conclusion, reason = unnamed_conclusion(selection, gap.falls, judged)
         if is_adequate or conclusion is not Conclusion.NOTHING_MISSING:
             return conclusion, reason
     if is_adequate:

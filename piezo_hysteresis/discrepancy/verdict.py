@@ -95,27 +95,30 @@ def not_predicted_live(name: str, live: float) -> str:
     )
 
 
-def conclusion_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> tuple[Conclusion, str]:
-    """What the search found, and the reason in words.
+def named_conclusion(selection: Selection, gap: Gap) -> tuple[Conclusion, str]:
+    """The conclusion and its reason if the effects of the search are named."""
+    accepted = [s.best.effect for s in selection.accepted]
+    names = " and ".join(e.public_name() for e in accepted)
+    explain = "explain" if len(accepted) > 1 else "explains"
+    rest = (
+        "the remaining error is at the noise floor"
+        if gap.after <= np.sqrt(ADEQUATE) * gap.floor
+        else f"an error of {gap.after / gap.floor:.1f} times the noise floor remains unexplained"
+    )
+    said = f"The model does not contain {names}, which {explain} {100 * gap.explained:.0f} % of the gap; {rest}."
+    if not selection.in_time:
+        said += MORE_MAY_BE_MISSING
+    fitted = [e.public_name() for e in accepted if not e.is_predicted_live()]
+    return Conclusion.MISSING_EFFECT, " ".join([said, *(not_predicted_live(name, gap.live) for name in fitted)])
 
-    `named` says whether its effects are to be named, and `falls` whether they reduce the gap on the test records.
+
+def unnamed_conclusion(selection: Selection, falls: bool, gap: Gap) -> tuple[Conclusion, str]:
+    """The conclusion and its reason if no effect is named.
+
+    `falls` says whether the effects of the search reduce the gap on the test records.
     """
-    if not selection.in_time and not named:
+    if not selection.in_time:
         return Conclusion.TIME_LIMIT, "No effect is named: the time limit ended the search before an answer was found."
-    names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
-    explain = "explain" if len(selection.accepted) > 1 else "explains"
-    closed = selection.explained(selection.score)
-    if named:
-        rest = (
-            "the remaining error is at the noise floor"
-            if gap.after <= np.sqrt(ADEQUATE) * gap.floor
-            else f"an error of {gap.after / gap.floor:.1f} times the noise floor remains unexplained"
-        )
-        said = f"The model does not contain {names}, which {explain} {100 * closed:.0f} % of the gap; {rest}."
-        fitted = [s.best.effect.public_name() for s in selection.accepted if not s.best.effect.is_predicted_live()]
-        if not selection.in_time:
-            said += MORE_MAY_BE_MISSING
-        return Conclusion.MISSING_EFFECT, " ".join([said, *(not_predicted_live(name, gap.live) for name in fitted)])
     many = gap.unseen and len(gap.per_phase) >= FEWEST_RECORDS
     is_adequate = many and gap.after <= TEST_ADEQUATE * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
     if not selection.accepted and (is_adequate or selection.score.excess <= ADEQUATE):
@@ -126,6 +129,7 @@ def conclusion_of(selection: Selection, named: bool, falls: bool, gap: Gap) -> t
         said = f"No effect is missing: the error is at the noise floor (at least {100 * ADEQUACY:g} % of the range)."
         return Conclusion.NOTHING_MISSING, said
     if selection.accepted and not falls:
+        names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
         said = f"No effect is named: {names} reduced the error on the training records, but not on the test records."
         return Conclusion.INSUFFICIENT_DATA, said
     message = ""

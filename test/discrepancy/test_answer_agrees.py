@@ -95,6 +95,11 @@ def check_agreement(found):
     live = [100.0 * np.sqrt(np.mean(errors[p.index] ** 2)) / after.now.range for p in found.gap.per_phase]
     assert np.sqrt(np.mean(np.square(live))) == pytest.approx(gap["live"], rel=0.1, abs=0.1 * gap["floor"])
     fitted_per_record = [e for e in answer["effects"] if not e["predicted_live"]]
+    per_phase = gap["per_phase"].values()
+    before, rest = (np.mean([(p[when] / p["floor"]) ** 2 for p in per_phase]) for when in ("before", "after"))
+    if answer["effects"]:
+        said = f"{100.0 * (1.0 - np.sqrt(max(0.0, rest - 1.0) / (before - 1.0))):.0f} % of the gap"
+        assert said in answer["reason"] and said in found.summary()
     page = verdict(after, answer)
     for text in (answer["reason"], " ".join(page.sentences)):
         assert bool(re.search("(not|cannot be) predicted live", text)) is bool(fitted_per_record)
