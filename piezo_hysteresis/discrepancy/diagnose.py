@@ -37,7 +37,7 @@ from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .many_records import diagnose_many
 from .same_stage import UNCHANGED_STAGE, same_stage
-from .search.execution.cores import using_cores
+from .search.cores import using_cores
 from .single_record import diagnose_few
 from .unnamed.correction import without_corrections
 from .verdict import FEWEST_RECORDS, Conclusion, Verdict
@@ -75,8 +75,8 @@ def diagnose(
         Subtract the error of the explicit step of Eq. (7), which only data of a simulation can contain. By default,
         data in which nothing else is missing have the verdict unknown, and the reason names this option.
     time_limit : float
-        Time after which the search ends with the best answer so far [s]. It does not limit the baseline before the
-        search and the last fit after it.
+        Time after which the search ends with the best answer so far [s]. It does not limit the fit of the published
+        model and the comparison with a given one before the search, and the last fit after it.
     cores : int, optional
         Largest number of processor cores that are used, at most 4; by default all that this process may use, or as many
         as the environment variable PYTHON_CPU_COUNT states. The answer does not depend on it.

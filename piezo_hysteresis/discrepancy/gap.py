@@ -98,7 +98,7 @@ class Gap:
 
     @property
     def shares(self) -> tuple[float, ...]:
-        """Share X of the gap that the model up to each named effect explains; the last is that of the extended model."""
+        """Share X of the gap that the model up to each named effect explains; the last is of the extended model."""
         before, after = self._squares
         return tuple(explained(before, square, 1.0) for square in (*self.between, after))
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..errors import DivergenceError
+from ..identification.fit.time_limit import ending_at
 from ..identification.records.noise_floor import ADEQUATE
 from ..model.model import Model
 from .conclusion import concluded
@@ -27,7 +28,6 @@ from .diagnosis_state import DiagnosisState
 from .explicit_step import explicit_model, without_steps
 from .localise import ResidualShare, located
 from .search.baseline_setup import BaselineSetup, prepare_baseline
-from .search.execution.time_limit import ending_at
 from .search.selection import select
 from .search.selection_result import Selection
 from .verdict import Conclusion

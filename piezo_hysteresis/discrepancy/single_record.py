@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 from ..errors import PiezoError
 from ..identification.fit.cross_validation import Score
 from ..identification.fit.fit import Fit
+from ..identification.fit.time_limit import TimeSpentError, ending_at
 from ..identification.identify import identify
 from ..identification.records.conditioning import with_conditioning
 from ..identification.records.excitation_check import missing_excitation
@@ -44,8 +45,7 @@ from .gap import Gap, measure_gap
 from .localise import located
 from .search.baseline import as_conditioning, with_zero
 from .search.candidates import loop_is_off, score_model
-from .search.execution.cores import start_helpers
-from .search.execution.time_limit import ending_at
+from .search.cores import start_helpers
 from .search.record_blocks import training_data_of
 from .search.refit import LAST, joint
 from .search.selection import select
@@ -97,10 +97,14 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     fitted = [i for i in used if i not in aside]
     known = as_conditioning(experiment, aside)
     progress("baseline", 0.1)
-    published, found = model, None
+    published, found, in_time = model, None, True
     if published is None:  # which records are not fitted was decided above
         published = identify(known, held_out=(), progress=lambda word, part: progress(word, 0.1 + 0.1 * part)).model
-        found = identify(known, held_out=(), memory=True, progress=lambda w, part: progress(w, 0.2 + 0.3 * part))
+        try:
+            with ending_at(state.end):
+                found = identify(known, held_out=(), memory=True, progress=lambda w, f: progress(w, 0.2 + 0.3 * f))
+        except TimeSpentError:
+            in_time = False
     start = found.model if found else published
     noise, span = noise_floors(records), experiment.range
     least = floors(records, noise)
@@ -139,7 +143,7 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
         steps, score = [*steps, *more.steps], more.score
     else:
         steps = [*steps, *(replace(s, accepted=False) for s in more.steps)]
-    selection = Selection(baseline.model, final.model, score, tuple(steps), more.null, more.in_time)
+    selection = Selection(baseline.model, final.model, score, tuple(steps), more.null, in_time and more.in_time)
 
     progress("gap", 0.9)
     first = model or baseline.model  # the gap of a given model is measured before any refit

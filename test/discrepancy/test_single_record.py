@@ -129,6 +129,15 @@ def test_the_time_limit_is_the_conclusion_if_it_ended_the_search(creeping):
     assert diagnose(creeping[:3], given, time_limit=1e-6).conclusion is Conclusion.TIME_LIMIT
 
 
+def test_the_time_limit_ends_the_choice_of_a_structure(creeping):
+    """Without a broadband record, this choice takes most of the time of a diagnosis."""
+    words: list[str] = []
+    found = diagnose(creeping, time_limit=1e-6, progress=lambda word, part: words.append(word))
+    assert found.conclusion is Conclusion.TIME_LIMIT and not found.names
+    assert found.model is not None and found.gap is not None
+    assert "gap" in words and "structure: effects" not in words
+
+
 def test_a_long_record_is_judged_like_the_same_data_recorded_at_the_rate_of_its_averages():
     """Averages have less noise; with the floor of the single samples, V was 0.17 and nothing seemed to be missing."""
     (long,) = sines(0.1, samples=200_000, hidden=Creep(gamma=0.01))

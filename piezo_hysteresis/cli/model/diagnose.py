@@ -57,8 +57,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         type=float,
         default=float("inf"),
         metavar="S",
-        help="time after which the search ends with the best answer so far [s] (default: no limit); the model that it "
-        "begins with and the last fit are not limited",
+        help="time after which the search ends with the best answer so far [s] (default: no limit); the fit of the "
+        "published model, the comparison with --model and the last fit are not limited",
     )
     parser.add_argument(
         "--explicit-step",

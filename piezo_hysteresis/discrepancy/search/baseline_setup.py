@@ -39,7 +39,7 @@ from ...model.model import Model
 from ...record import Record
 from .baseline import exact, modal_models, start_models
 from .candidates import score_baseline, score_model
-from .execution.cores import start_helpers
+from .cores import start_helpers
 from .refit import FAILURES, LAST, PRECISE, joint
 from .selection_result import Selection
 from .training_data import TrainingData, choose_test_records

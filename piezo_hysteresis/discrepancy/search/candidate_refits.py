@@ -27,7 +27,7 @@ from ...identification.fit.fit import Progress
 from ...identification.records.noise_floor import ADEQUATE
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate
-from .execution.cores import on_cores
+from .cores import on_cores
 from .refit import FIRST, LATER, from_all_starts, proceed, refit, restart
 
 LEAST_GAIN = 0.15

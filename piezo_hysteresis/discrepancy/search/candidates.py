@@ -37,7 +37,7 @@ from ...identification.fit.cross_validation import Score, cross_validate, indisp
 from ...identification.fit.fit import Fit, gauge
 from ...identification.fit.normal_equations import Gram, grams
 from ...model.model import Model
-from .execution.cores import on_cores
+from .cores import on_cores
 from .training_data import TrainingData
 
 BY_COST = attrgetter("score.cost")

@@ -28,13 +28,13 @@ from functools import partial, reduce
 from ...errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit, fit
+from ...identification.fit.time_limit import check_time
 from ...identification.steps.dynamics import Dynamics, identify_arx
 from ...identification.steps.linear_start import FEW_ITERATIONS, ITERATIONS, form_of, hysteresis_signals, with_dynamics
 from ...identification.steps.modes import identify_modes
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate, adjusted_numbers, score_model
-from .execution.cores import on_cores
-from .execution.time_limit import check_time
+from .cores import on_cores
 from .training_data import TrainingData
 
 LINEAR = ("lag", "dynamics")
@@ -65,7 +65,6 @@ def joint(model: Model, training_data: TrainingData, max_iterations: int, tolera
     `tolerance` is the relative decrease of the cost at convergence. The fit raises one of `FAILURES`, or a
     TimeSpentError if the time limit of the search has passed.
     """
-    check_time()
     return fit(
         model,
         training_data.records,

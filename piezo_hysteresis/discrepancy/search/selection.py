@@ -26,6 +26,7 @@ from ...effects import CATALOGUE, Effect
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Progress
 from ...identification.fit.normal_equations import residuals
+from ...identification.fit.time_limit import TimeSpentError
 from ...identification.records.noise_floor import ADEQUATE
 from ...model.model import Model
 from .acceptance_tests import bends_all_along, first_rejection
@@ -38,7 +39,6 @@ from .candidate_refits import (
     simplest,
 )
 from .candidates import BY_COST, FittedCandidate, screen
-from .execution.time_limit import TimeSpentError
 from .selection_result import Rejection, Selection, Step
 from .training_data import TrainingData
 

@@ -31,6 +31,7 @@ from .bounded_step import bounds_of, room_of
 from .covariance import covariance
 from .normal_equations import Gram, Nuisance, grams, residuals
 from .stable_step import stable_step
+from .time_limit import check_time
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -179,11 +180,10 @@ def fit(
     IdentificationError
         If no parameter is free, or if the start values diverge.
     """
+    check_time()
     free = tuple(free)
     if not free or not records:
-        raise IdentificationError(
-            f"fit: got {len(free)} free numbers and {len(records)} records, expected some of both"
-        )
+        raise IdentificationError(f"fit: got {len(free)} numbers and {len(records)} records, expected some of both")
     sizes = np.ones(len(records)) if floors is None else np.asarray(floors, dtype=float)
     lower, upper = bounds_of(model, free)
     values = model.values()

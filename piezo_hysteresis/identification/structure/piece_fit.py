@@ -29,6 +29,7 @@ from ...model.model import Model
 from ..fit.bounded_step import bounded_step, bounds_of
 from ..fit.fit import gauge
 from ..fit.normal_equations import grams
+from ..fit.time_limit import check_time
 from .pieces import WEIGHTS, RecordPiece
 from .prior import WAVES, prior_of, slow_rows
 
@@ -182,7 +183,13 @@ def fit_pieces(
         Free numbers.
     max_iterations : int
         Largest number of linearisations.
+
+    Raises
+    ------
+    TimeSpentError
+        If the time limit of the search has passed.
     """
+    check_time()
     slow = slow_rows(pieces, model.displacement_scale)
 
     def products(model: Model, names: Sequence[str]) -> tuple[Array, Array]:

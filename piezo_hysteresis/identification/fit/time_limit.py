@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Time limit of a search for effects: refits check it before they begin, and the search keeps its result so far."""
+"""Time limit of a search: fits check it before they begin, and the search keeps its result so far."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ _END: ContextVar[float] = ContextVar("end of the search", default=float("inf"))
 
 
 class TimeSpentError(Exception):
-    """The time limit of the search has passed; `select` ends with its result so far."""
+    """The time limit of the search has passed; who set it continues with the result so far."""
 
 
 @contextmanager
 def ending_at(end: float) -> Iterator[None]:
-    """Refits in this context raise `TimeSpentError` after a time.
+    """Fits in this context raise `TimeSpentError` after a time.
 
     Parameters
     ----------

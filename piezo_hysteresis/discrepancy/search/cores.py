@@ -35,8 +35,8 @@ from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 
-from ....identification.one_core import on_one_core
-from .time_limit import end_of_search, ending_at
+from ...identification.fit.time_limit import end_of_search, ending_at
+from ...identification.one_core import on_one_core
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
