@@ -68,6 +68,8 @@ class Gap:
     live : float
         Expected error of the extended model in live prediction [% of range]: without the numbers that are fitted to
         each record. It differs from `after` only for effects that are not predicted live.
+    free_zeros : bool
+        Whether the sensor zero was free in every record.
     between : tuple of float
         V of the model up to each named effect but the last.
     """
@@ -79,6 +81,7 @@ class Gap:
     per_phase: tuple[PhaseGap, ...]
     unseen: bool
     live: float
+    free_zeros: bool = False
     between: tuple[float, ...] = ()
 
     @property
@@ -205,5 +208,6 @@ def measure_gap(
         ),
         unseen=unseen,
         live=float(np.sqrt(np.mean(np.square(live)))),
+        free_zeros=offset,
         between=tuple(partial),
     )

@@ -137,7 +137,7 @@ def compare(
 def compare_diagnosis(found: Diagnosis) -> ModelComparison:
     """The experiment of a diagnosis, with the model before and, if an effect or a change was named, after it.
 
-    As in the gap of the answer, the sensor zero of every record is free. Without a model if one diverges on a record.
+    The sensor zero of every record is free if it is in the gap. Without a model if one diverges on a record.
     """
     models = {}
     if found.baseline is not None:
@@ -145,9 +145,8 @@ def compare_diagnosis(found: Diagnosis) -> ModelComparison:
     is_named = found.change is not None or (found.selection is not None and bool(found.selection.accepted))
     if is_named and found.model is not None and found.model is not found.baseline:
         models["after"] = found.model
+    offset = found.gap is None or found.gap.free_zeros
     try:
-        return compare(
-            found.experiment, models, {label: free_per_record(model, offset=True) for label, model in models.items()}
-        )
+        return compare(found.experiment, models, {n: free_per_record(m, offset=offset) for n, m in models.items()})
     except DivergenceError:
         return compare(found.experiment)
