@@ -128,16 +128,16 @@ def unnamed_conclusion(selection: Selection, falls: bool, gap: Gap) -> tuple[Con
             return Conclusion.INSUFFICIENT_DATA, said
         said = f"No effect is missing: the error is at the noise floor (at least {100 * ADEQUACY:g} % of the range)."
         return Conclusion.NOTHING_MISSING, said
-    if selection.accepted and not falls:
-        names = " and ".join(s.best.effect.public_name() for s in selection.accepted)
+    accepted = [s.best.effect.public_name() for s in selection.accepted]
+    if accepted and not falls:
+        names = " and ".join(accepted)
         said = f"No effect is named: {names} reduced the error on the training records, but not on the test records."
         return Conclusion.INSUFFICIENT_DATA, said
     message = ""
     if selection.steps:
-        closest = selection.steps[0].best
-        share = 100 * selection.explained(closest.score)
-        why = "".join(f" ({r.reason})" for r in selection.steps[0].rejected if r.name == closest.name)
-        message = (
-            f"; the closest effect is {closest.effect.public_name()}, which explains {share:.0f} % of the gap{why}"
-        )
+        first = selection.steps[0]
+        closest = " with ".join(accepted) or first.best.effect.public_name()
+        share = 100 * selection.explained(selection.score if accepted else first.best.score)
+        why = "".join(f" ({r.reason})" for r in first.rejected if r.name == first.best.name)
+        message = f"; the closest effect is {closest}, which explains {share:.0f} % of the gap{why}"
     return Conclusion.UNEXPLAINED_GAP, f"Something is missing that no effect of the catalogue explains{message}."

@@ -14,16 +14,19 @@
 
 """What a name asks for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from piezo_hysteresis.discrepancy.gap import Gap
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
-from piezo_hysteresis.discrepancy.verdict import is_explained
-from piezo_hysteresis.effects import Arx, BoucWen, Creep
+from piezo_hysteresis.discrepancy.verdict import Conclusion, is_explained, unnamed_conclusion
+from piezo_hysteresis.effects import Arx, BoucWen, Creep, MainsHum
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
@@ -62,3 +65,16 @@ def test_explaining_more_and_leaving_less_is_never_worse(first, leaves, second, 
 def test_nothing_added_explains_nothing():
     score = Score(np.full(10, 5.0), np.zeros(1))
     assert not is_explained(Selection(STAGE, STAGE, score, (), 1.0))
+
+
+def test_the_closest_answer_is_all_that_was_added():
+    """Of two effects that explain 50 % together, only the first was stated, with its 40 %."""
+    first = selection(0.4, 50.0)
+    after = Score(np.sqrt(1.0 + 0.25 * (first.steps[0].before.ratios ** 2 - 1.0)), np.zeros(1))
+    (step,) = first.steps
+    hum = FittedCandidate(MainsHum(), EVIDENCE, after, step.best.fit)
+    second = replace(first, score=after, steps=(step, Step(step.best.score, hum, True, (), ())))
+    gap = Gap(1.0, 1.0, 0.1, None, (), True, 1.0)
+    conclusion, reason = unnamed_conclusion(second, True, gap)
+    assert conclusion is Conclusion.UNEXPLAINED_GAP
+    assert "the closest effect is creep with mains_hum, which explains 50 % of the gap" in reason
