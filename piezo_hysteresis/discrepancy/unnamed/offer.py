@@ -30,7 +30,6 @@ from ..gap import measure_gap
 from ..search.baseline_setup import BaselineSetup
 from ..search.candidate_refits import LEAST_GAIN
 from ..search.refit import FAILURES, LAST, PRECISE, joint
-from ..search.selection_result import explained
 from ..search.training_data import TrainingData
 from .correction import Correction, corrections_in
 from .held_out import HeldOut, held_out, rate_and_amplitude_groups
@@ -130,26 +129,24 @@ def judged_on_test_records(
 ) -> Correction:
     """The correction after the last fit to all samples, judged on the test records."""
     training_data, _ = setup.for_last_fit()
+    least, span = setup.least.tolist(), setup.span
     try:
         fit = joint(model.with_effect(correction.effect), training_data, LAST, PRECISE)
-        gap = measure_gap(
-            (model, fit.model), setup.records, setup.test_records, setup.least.tolist(), setup.span, unseen=True
-        )
+        gap = measure_gap((model, fit.model), setup.records, setup.test_records, least, span, unseen=True)
+        everywhere = measure_gap((fit.model, fit.model), setup.records, setup.usable, least, span, unseen=False)
     except FAILURES as error:
         return replace(correction, refusal=f"its last fit failed ({error})")
-    ratios = np.array([(p.before / p.floor, p.after / p.floor) for p in gap.per_phase])
-    first, second = np.mean(ratios**2, axis=0).tolist()
-    removed, (effect,) = explained(first, second, training_data.null), corrections_in(fit.model)
+    removed, (effect,) = gap.explained, corrections_in(fit.model)
     found = replace(correction, effect=effect, gap=gap, removed=removed)
     if removed < REMOVES:
-        least = f"at least {100 * REMOVES:g} % is needed"
-        refusal = f"it removes {100 * removed:.0f} % of the gap on the test records, and {least}"
+        needed = f"at least {100 * REMOVES:g} % is needed"
+        refusal = f"it removes {100 * removed:.0f} % of the gap on the test records, and {needed}"
         return replace(found, refusal=refusal)
     if found.worst > WORSE:
         most = f"at most {100 * (WORSE - 1.0):.0f} % is allowed"
         refusal = f"it increases the error of a test record by {100 * (found.worst - 1.0):.0f} %, and {most}"
         return replace(found, refusal=refusal)
-    stated = gap.stated_by(fit.stated_model, experiment)
+    stated = gap.stated_by(fit.stated_model, experiment, everywhere)
     envelope = identified_range(setup.records, setup.fitted)
     return replace(found, model=replace(stated, provenance={**stated.provenance, **envelope}))
 
