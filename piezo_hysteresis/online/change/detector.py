@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from .baseline import Baseline, DriveClass, drive_class
 from .false_alarm_threshold import WINDOW, false_alarm_threshold
-from .scatter import Scatter
+from .scatter import Scatter, beside_offset
 from .score import BLOCK_TIME, GROUPS, ChangeScore
 
 Array = NDArray[np.float64]
@@ -42,6 +42,9 @@ OFFSET_SCORES = 50
 
 _OFFSET = GROUPS.index("offset")
 """Row of the offset."""
+
+_TINY = float(np.finfo(np.float64).tiny)
+"""Smallest product of two numbers of information that counts as more than zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,9 +111,10 @@ class ChangeDetector:
             return Change(watched=True)
         if self._offset_weight:
             gradient = gradient - weight[:, _OFFSET] * (self._offset / self._offset_weight)
-        self._window.append((gradient, np.diag(weight), score.stamp, key))
+        self._window.append((gradient, weight, score.stamp, key))
         del self._window[:-WINDOW]
-        gradients, weights = (np.cumsum([row[k] for row in reversed(self._window)], axis=0) for k in (0, 1))
+        sums = [np.cumsum([row[k] for row in reversed(self._window)], axis=0) for k in (0, 1)]
+        gradients, weights = beside_offset(*sums)
         length = np.arange(1, len(gradients) + 1)[:, None]
         variance = 1.0 + self._variance_of_baseline(weights)
         if not self._same_offset:
@@ -118,10 +122,16 @@ class ChangeDetector:
         variance = variance * scatter.inflation(len(gradients)) + scatter.wander * weights
         seen = scatter.excited & (weights > 0.0)
         statistic = np.where(seen, gradients**2 / np.where(seen, weights, 1.0) / variance, 0.0)
-        at, group = np.unravel_index(int(statistic.argmax()), statistic.shape)
+        at, largest = np.unravel_index(int(statistic.argmax()), statistic.shape)
+        alone = gradients[at] ** 2 / np.where(seen[at], weights[at], np.inf)
+        if largest == _OFFSET:  # a change of another group moves the offset, too
+            alone = sums[0][at] ** 2 / np.where(seen[at], np.diag(sums[1][at]), np.inf)
+        else:
+            alone[_OFFSET] = 0.0
+        group = int(alone.argmax())
         return Change(
-            float(statistic[at, group]) / self._threshold(key, scatter),
-            self._alike(int(group), scatter),
+            float(statistic[at, largest]) / self._threshold(key, scatter),
+            _alike(group, sums[1][at]),
             float(gradients[at, group] / weights[at, group]),
             float(np.sqrt(variance[at, group] / weights[at, group])),
             self._window[-1 - int(at)][2] - round(BLOCK_TIME * 1e9),
@@ -148,12 +158,22 @@ class ChangeDetector:
             self._thresholds[key] = false_alarm_threshold(directions(scatter), self._interval, scatter.memory)
         return self._thresholds[key]
 
-    def _alike(self, group: int, scatter: Scatter) -> tuple[str, ...]:
-        direction = directions(scatter)
-        size = np.linalg.norm(direction, axis=1)
-        cosine = np.abs(direction @ direction[group]) / np.where(size > 0, size, np.inf) / size[group]
-        others = [k for k in np.argsort(-cosine) if k != group and cosine[k] > ALIKE]
-        return (GROUPS[group], *(GROUPS[k] for k in others))
+
+def _alike(group: int, weight: Array) -> tuple[str, ...]:
+    """A group, and those that a sum of scores with the Fisher information `weight` (5, 5) cannot distinguish from it.
+
+    Two groups are alike if they are so with a known offset, or with an unknown one.
+    """
+    beside = weight - np.outer(weight[_OFFSET], weight[_OFFSET]) / weight[_OFFSET, _OFFSET]
+    cosine = np.maximum(_cosines(weight, group), _cosines(beside, group))
+    others = [k for k in np.argsort(-cosine) if k != group and cosine[k] > ALIKE]
+    return (GROUPS[group], *(GROUPS[k] for k in others))
+
+
+def _cosines(weight: Array, group: int) -> Array:
+    """Cosines between the directions of all groups and that of one; 0 where one of the two has no information."""
+    square = np.diag(weight) * weight[group, group]
+    return np.abs(weight[group]) / np.sqrt(np.where(square > _TINY, square, np.inf))
 
 
 def _squared_cosine_to_offset(scatter: Scatter) -> Array:

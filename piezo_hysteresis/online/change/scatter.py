@@ -40,7 +40,7 @@ SLOWEST_DECAY = 0.98
 """Largest ratio between the correlations of scores at successive lags; it is a correlation time of 5 s."""
 
 FEWEST_WINDOWS = 4
-"""Fewest windows of `WINDOW` scores of one class from which a drift of the misfit is estimated."""
+"""Fewest windows of scores of one class from which a drift of the misfit is estimated; they have at most `WINDOW`."""
 
 SMALLEST = 1e-10
 """Eigenvalues below this share of the largest count as zero."""
@@ -76,8 +76,8 @@ class Scatter:
         First row: correlation between successive gradients of each group. Second row: factor by which the correlation
         falls with every further score.
     wander : (5,) ndarray
-        Variance of the apparent change of each group between windows of `WINDOW` scores, minus the variance that the
-        other numbers explain: the systematic error of the model drifts.
+        Variance of the apparent change of each group between windows of at most `WINDOW` scores, minus the variance
+        that the other numbers explain: the systematic error of the model drifts.
     power : float
         Mean square of the residual about its mean [m²].
     """
@@ -133,9 +133,26 @@ class Scatter:
         none = np.zeros((2, len(GROUPS)))
         bare = cls(len(scores), misfit, precision, slope, none, none[0], residual_power(scores))
         pairs = [bare.gradient(score) for score in scores]
-        gradients, weights = np.array([g for g, _ in pairs]), np.array([np.diag(w) for _, w in pairs])
-        known = replace(bare, memory=_memory(gradients / np.sqrt(np.maximum(weights, _TINY))))
-        return replace(known, wander=_wander(gradients, weights, known.inflation(WINDOW)[-1]))
+        gradients, weights = np.array([g for g, _ in pairs]), np.array([w for _, w in pairs])
+        own = np.sqrt(np.maximum(np.diagonal(weights, axis1=1, axis2=2), _TINY))
+        known = replace(bare, memory=_memory(gradients / own))
+        size = min(WINDOW, len(scores) // FEWEST_WINDOWS)
+        return replace(known, wander=_wander(gradients, weights, known.inflation(size)[-1], size))
+
+
+def beside_offset(gradients: Array, weights: Array) -> tuple[Array, Array]:
+    """Gradients (n, 5) and information (n, 5) of sums of scores about each group, if the offset is not known.
+
+    Every slow drift of the zero and every error of the creep moves the offset. In a part of a scan an offset resembles
+    each of the other groups. That of the offset itself is not changed. `weights` has the shape (n, 5, 5).
+    """
+    offset = GROUPS.index("offset")
+    common, own = weights[:, :, offset], np.diagonal(weights, axis1=1, axis2=2)
+    known = own[:, offset, None]
+    share = common / np.where(known > 0.0, known, np.inf)
+    share[:, offset] = 0.0
+    left = own - share * common
+    return gradients - share * gradients[:, offset, None], np.where(left > DISTINCT * own, left, 0.0)
 
 
 def residual_power(scores: Sequence[ChangeScore]) -> float:
@@ -212,12 +229,11 @@ def _memory(series: Array) -> Array:
     return np.vstack((np.clip(one, 0.0, (1.0 + decay) / 2.0), decay))
 
 
-def _wander(gradients: Array, weights: Array, inflation: Array) -> Array:
-    """`Scatter.wander` from the gradients (n, 5) and their information (n, 5); 0 where noise explains the variance."""
-    windows = len(gradients) // WINDOW
-    if windows < FEWEST_WINDOWS:
-        return np.zeros(len(GROUPS))
-    gradient, weight = (x[: windows * WINDOW].reshape(windows, WINDOW, -1).sum(axis=1) for x in (gradients, weights))
+def _wander(gradients: Array, weights: Array, inflation: Array, size: int) -> Array:
+    """`Scatter.wander` from the gradients (n, 5) and weights (n, 5, 5); 0 where noise explains the variance."""
+    windows = len(gradients) // size
+    sums = (x[: windows * size].reshape(windows, size, *x.shape[1:]).sum(axis=1) for x in (gradients, weights))
+    gradient, weight = beside_offset(*sums)
     seen = (weight > 0.0).all(axis=0)
     weight = np.where(seen, weight, 1.0)
     expected = (inflation / weight).mean(axis=0) * (1.0 + 2.0 * np.sqrt(2.0 / (windows - 1)))

@@ -50,7 +50,7 @@ class ChangeWatch:
     since : int
         Stamp at which the present change began [ns]; 0 while there is none.
     groups : tuple of str
-        Groups of parameters that explained the present or the last change best when its statistic was largest.
+        Groups of parameters that explained the present or the last change best, over the longest time.
     alarms : int
         Number of changes detected so far.
 
@@ -69,7 +69,7 @@ class ChangeWatch:
         self.baseline = baseline
         self.change, self.since, self.alarms = Change(), 0, 0
         self.groups: tuple[str, ...] = ()
-        self._strongest = 0.0
+        self._best = (0, 0.0)
         self._model: Model | None = None
         self._hash = ""
         self._scores: Scores | None = None
@@ -151,11 +151,12 @@ class ChangeWatch:
             self.change = self._detector.add(score)
             if self.change.statistic > 1.0 and not self.since:
                 self.since, self.alarms = self.change.onset, self.alarms + 1
-                self._strongest = 0.0
+                self._best = (0, 0.0)
             elif self.change.watched and self.change.statistic < CLEARED:
                 self.since = 0
-            if self.since and self.change.statistic > self._strongest:
-                self._strongest, self.groups = self.change.statistic, self.change.groups
+            known = score.stamp - self.change.onset, self.change.statistic
+            if self.since and self.change.statistic > 1.0 and known > self._best:
+                self._best, self.groups = known, self.change.groups
         return None
 
 

@@ -276,3 +276,25 @@ def test_scores_that_are_simulated_have_the_memory_of_the_baseline(first, decay)
     correlate(series, memory[1], moving_average(memory))
     correlation = [np.mean(series[k:] * series[: series.size - k]) for k in range(4)]
     assert correlation == pytest.approx([1.0, first, first * decay, first * decay**2], abs=0.02)
+
+
+@pytest.mark.parametrize(("frequency", "gamma", "noise"), [(0.37, 0.02, 1e-4), (0.37, 0.03, 5e-4), (1.0, 0.03, 5e-4)])
+def test_creep_that_the_model_describes_badly_is_no_change(frequency, gamma, noise):
+    """The zero moves on. In half a scan this resembles a lag or a gain, and there were 20 to 40 alarms."""
+    drive = sine(130.0, frequency)
+    stage, model = (MODEL.with_effect(Creep(gamma=g, tau_min=PERIOD)) for g in (0.015, gamma))
+    watch, largest = follow(drive, run(stage, drive), model=model, noise=noise)
+    assert watch.alarms == 0 and largest < 1.0
+
+
+@pytest.mark.parametrize("group", ["gain", "dynamics", "offset"])
+def test_a_change_beside_such_creep_has_its_name(group):
+    drive = sine(160.0, 1.0)
+    stage, model = (MODEL.with_effect(Creep(gamma=g, tau_min=PERIOD)) for g in (0.015, 0.02))
+    late = np.arange(drive.size) >= round(130.0 / PERIOD)
+    y = run(stage, drive)
+    slower = run(stage.with_values({"arx.delay": 2.0}), drive)
+    changed = {"gain": 1.01 * y, "dynamics": slower, "offset": y + 3e-8}[group]
+    watch, _ = follow(drive, np.where(late, changed, y), model=model)
+    assert group in watch.groups
+    assert watch.change.groups[0] == group
