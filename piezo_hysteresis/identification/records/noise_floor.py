@@ -44,6 +44,10 @@ UNUSUAL = 2.0
 """Ratio of the scatter of a record to the value expected from the others from which the stage counts as not settled."""
 TOP_BAND = 0.7
 """Share of the Nyquist frequency above which a record contains only noise."""
+SHORT = 32
+"""Samples of a short window: the longest between the turns of a fast drive, the shortest in which ringing is a peak."""
+CHANCE = 2.0
+"""Relative differences, times √n, up to which the noise of short windows is the same as that of a whole record."""
 
 
 def stroke(records: Sequence[Record]) -> float:
@@ -54,23 +58,29 @@ def stroke(records: Sequence[Record]) -> float:
 def white_noise(record: Record) -> float:
     """RMS of the white noise of a record [m], from the median of its spectrum near the Nyquist frequency.
 
-    Fewer than 32 samples have no such spectrum: their noise is that of third differences, in which motion is small. 0
-    for fewer than eight samples, which do not show it.
+    Fast motion is in all samples but not near the Nyquist frequency. Jumps, turns and the ringing that they start are
+    at all frequencies of a record, but in few of its short windows. Fewer than 32 samples have no such spectrum: their
+    noise is that of third differences, in which motion is small. 0 for fewer than eight samples, which do not show it.
     """
     if record.size < 8:
         return 0.0
     beside_motion = noise_on_motion(record.displacement, 3)
-    if record.size < 32:
+    if record.size < SHORT:
         return beside_motion
     second = np.diff(record.displacement, 2)
-    _, density = scipy.signal.periodogram(second, window=scipy.signal.windows.hann(second.size), detrend=False)
-    frequency = np.linspace(0.0, np.pi, density.size)
-    response = (2.0 * np.sin(frequency / 2.0)) ** 4
-    top = slice(int(TOP_BAND * density.size), -1)
-    # values of a periodogram have an exponential distribution, whose median is ln 2 times its mean
-    at_top = float(np.sqrt(np.median(density[top] / response[top]) / np.log(2.0) / 2.0))
-    # jumps are in all of the spectrum but in few samples; fast motion is in all samples but not at the top
-    return min(at_top, beside_motion)
+    at_top, between_jumps = _at_top(second, second.size, "hann"), _at_top(second, SHORT, "blackmanharris")
+    return min(at_top, beside_motion, (1.0 + CHANCE / np.sqrt(second.size)) * between_jumps)
+
+
+def _at_top(second: Array, size: int, window: str) -> float:
+    """White noise of which these are the second differences [m], from the spectra of all windows of so many samples."""
+    size = min(size, second.size)
+    options = {"window": window, "nperseg": size, "noverlap": size - size // 4, "detrend": False}
+    frequency, _, density = scipy.signal.spectrogram(second, **options)
+    top = slice(int(TOP_BAND * frequency.size), -1)
+    flat = density[top] / ((2.0 * np.sin(np.pi * frequency[top])) ** 4)[:, None]
+    # values of a spectrum have an exponential distribution, whose median is ln 2 times its mean
+    return float(np.sqrt(np.median(flat) / np.log(2.0) / 2.0))
 
 
 def period_scatter(record: Record) -> float | None:
@@ -97,18 +107,26 @@ def _scatter(record: Record, period: int, first: int) -> float:
     t = record.sample_period * np.arange(steps.size)
     lines = [f for base in MAINS for f in (base, 2 * base, 3 * base) if f * record.sample_period < 0.45]
     hum = [wave(2 * np.pi * f * t) for f in lines for wave in (np.cos, np.sin)]
-    basis = np.array([np.ones(t.size), rest, np.gradient(rest), *seen, *hum])
+    beside = [np.ones(t.size), rest, np.gradient(rest), *seen]
+    # waves of constant size that are fitted to ringing leave peaks at all lines, and these fill a short spectrum
+    without_hum = _broad(steps, [*beside, *hum], "hann", period)
+    return min(without_hum, _broad(steps, beside, "blackmanharris", period))
+
+
+def _broad(steps: Array, known: Sequence[Array], taper: str, period: int) -> float:
+    """RMS of the noise of one period in differences of two [m], beside `known` signals and peaks of the spectrum."""
+    basis = np.array(known)
     steps = steps - np.linalg.lstsq(basis.T, steps, rcond=1e-6)[0] @ basis
-    window = scipy.signal.windows.hann(steps.size)
+    window = scipy.signal.windows.get_window(taper, steps.size, fftbins=False)
     frequency, density = scipy.signal.periodogram(steps, window=window, detrend=False)
     # the difference of two periods is a comb filter: white noise gets this mean spectrum, with twice its variance
     alike = window[period:] @ window[:-period] / (window @ window) if steps.size > period else 0.0
     comb = 1.0 - alike * np.cos(2.0 * np.pi * frequency * period)
     noise = np.where(comb > 0.2, density / np.maximum(comb, 0.2), np.nan)
-    return float(np.sqrt(_broad(noise) / steps.size / 2.0))
+    return float(np.sqrt(_sum_of_octaves(noise) / steps.size / 2.0))
 
 
-def _broad(density: Array) -> float:
+def _sum_of_octaves(density: Array) -> float:
     """Sum of a spectrum from the medians of its octaves, without dc, so that narrow peaks are ignored."""
     edges = [1]
     while edges[-1] < density.size:
