@@ -27,7 +27,7 @@ from ..parameter import slew_text
 from ..record import Experiment, Notice, Record
 from .records.excitation_content import MOVES, ExcitationContent, excitation_content, moving
 from .records.noise import voltage_noise
-from .records.steady_waves import slowest_wave
+from .records.steady_waves import rates_of_waves
 from .steps.remaining_lag import error_of_lag
 from .structure.pieces import Kind, pieces_of
 
@@ -148,7 +148,8 @@ def _motion(record: Record) -> ExcitationContent:
     content = excitation_content(Record(voltage, voltage, record.sample_period, continues=True))
     if not content.waves:
         return content
-    return replace(content, slowest=slowest_wave(voltage, record.sample_period, float(voltage_noise((record,))[0])))
+    slowest, _ = rates_of_waves(voltage, record.sample_period, float(voltage_noise((record,))[0]))
+    return replace(content, slowest=slowest)
 
 
 def _lag_error(model: Model, frequency: float) -> str:

@@ -98,3 +98,19 @@ def test_a_fast_triangle_after_a_hold_does_not_determine_the_dynamics():
     drive = growing_sine(60.0, 5e-4, (0.4, 0.7, 1.0), triangle=True)
     record = Record(drive, 1e-6 * drive, 5e-4, "triangle", initial_voltage=0.0)
     assert roles_of(Experiment((record,))).broadband == ()
+
+
+@pytest.mark.parametrize("period", [1e-4, 1e-3])
+@pytest.mark.parametrize("cycles", [3.3, 5.3, 12.4])
+@pytest.mark.parametrize("rest", [0.0, 0.05])
+def test_the_highest_frequency_of_a_short_sine_is_its_rate(period, cycles, rest):
+    """Its power is spread over neighbouring frequencies: 95 % of that of 5.3 cycles of 60 Hz are below 68 Hz."""
+    sine = 5.0 - 4.0 * np.cos(2.0 * np.pi * 60.0 * period * np.arange(round(cycles / 60.0 / period)))
+    voltage = np.concatenate((np.full(round(rest / period), 1.0), sine, np.full(round(rest / period), sine[-1])))
+    assert content(voltage, period).highest == pytest.approx(60.0, rel=0.03)
+
+
+def test_the_highest_frequency_of_other_drives_includes_their_harmonics(random):
+    for voltage in (triangle(10.0, 2.0, 1e-3), random.standard_normal(20_000)):
+        found = content(voltage, 1e-3)
+        assert found.highest == found.bandwidth > 30.0

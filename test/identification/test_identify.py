@@ -231,7 +231,7 @@ def test_rests_and_steps_have_no_highest_frequency(with_step):
     found = identify(Experiment(records))
     messages = {n.kind: n.message for n in found.notices}
     (ends,) = re.findall(r"the drive ends at ([\d.]+) Hz", messages["lag_only"])
-    assert float(ends) == pytest.approx(2.0, rel=0.15)
+    assert float(ends) == pytest.approx(2.0, rel=0.02)
     assert ("one_frequency" in messages) is not with_step
 
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ...record import Record, Samples
 from .noise import noise_of, noise_on_motion, voltage_noise
-from .steady_waves import is_row_of_waves
+from .steady_waves import is_row_of_waves, rates_of_waves
 
 SLOW = 30.0
 """Frequency below which a drive shows the dynamics of a stage only as a lag [Hz]."""
@@ -44,6 +44,8 @@ RINGS = 0.05
 """Longest ringing of a stage after a step [s]; a drive that is held for longer shows the same step response again."""
 HELD = 32
 """Smallest number of samples of such a hold."""
+HARMONIC = 2.0
+"""Ratio of bandwidth and rate of a wave below which it has no harmonics, and the bandwidth is that of a short wave."""
 ONE_WAY = 0.9
 """Share of the motion of such a drive that the net changes between its levels are."""
 
@@ -71,6 +73,9 @@ class ExcitationContent:
         Whether the drive consists of sines or triangles of a few rates, one after another.
     levels : bool
         Whether the drive moves from level to level and is held there: every change shows the same step response.
+    highest : float
+        Highest frequency of the drive [Hz]: the rate of the fastest sine, around which the power of a short one is
+        spread, and the bandwidth of other drives.
     """
 
     span: float
@@ -81,6 +86,7 @@ class ExcitationContent:
     noise: float
     waves: bool = False
     levels: bool = False
+    highest: float = 0.0
 
     @property
     def is_broadband(self) -> bool:
@@ -117,7 +123,9 @@ def excitation_content(record: Record) -> ExcitationContent:
     moments = min(_spread(speed), _spread(np.diff(speed)))
     waves = is_row_of_waves(record.voltage, record.sample_period, bandwidth, noise)
     levels = _holds_levels(record.voltage, max(HELD, round(RINGS / record.sample_period)))
-    return ExcitationContent(span, bandwidth, slowest, lines, moments, noise_of(record), waves, levels)
+    rate = rates_of_waves(record.voltage, record.sample_period, noise)[1] if waves else bandwidth
+    highest = min(rate, bandwidth) if bandwidth < HARMONIC * rate else bandwidth
+    return ExcitationContent(span, bandwidth, slowest, lines, moments, noise_of(record), waves, levels, highest)
 
 
 def moving(contents: Sequence[ExcitationContent]) -> list[ExcitationContent]:

@@ -69,15 +69,15 @@ def is_row_of_waves(voltage: Samples, sample_period: float, bandwidth: float, no
     swings = _swings(voltage, noise)
     if swings.size < FEWEST:
         return False
-    rates, covered, shortest, _ = _rows(swings)
+    rates, covered, shortest, *_ = _rows(swings)
     slow_enough = 2.0 * shortest * sample_period * bandwidth <= HARMONICS
     return bool(0 < rates <= MOST and covered >= COVERED * swings.size and shortest >= SHORTEST and slow_enough)
 
 
-def slowest_wave(voltage: Samples, sample_period: float, noise: float = 0.0) -> float:
-    """Rate of the slowest wave of such a drive [Hz]; arguments as above."""
-    *_, longest = _rows(_swings(voltage, noise))
-    return 0.5 / (longest * sample_period)
+def rates_of_waves(voltage: Samples, sample_period: float, noise: float = 0.0) -> tuple[float, float]:
+    """Rates of the slowest and of the fastest wave of such a drive [Hz]; arguments as above."""
+    *_, shortest, longest = _rows(_swings(voltage, noise))
+    return 0.5 / (longest * sample_period), 0.5 / (shortest * sample_period)
 
 
 def _swings(voltage: Samples, noise: float) -> NDArray[np.int64]:
@@ -88,12 +88,13 @@ def _swings(voltage: Samples, noise: float) -> NDArray[np.int64]:
 
 
 @kernel
-def _rows(sizes: NDArray[np.int64]) -> tuple[int, int, int, int]:
+def _rows(sizes: NDArray[np.int64]) -> tuple[int, int, int, float, float]:
     """Rows of at least `FEWEST` swings that take equally long.
 
-    Returns their number, the number of swings in them, and the samples of the shortest and of the longest such swing.
+    Returns their number, the number of swings in them, the samples of the shortest such swing, and the mean samples of
+    a swing in the fastest and in the slowest row.
     """
-    rates, covered, shortest, longest = 0, 0, 1 << 60, 0
+    rates, covered, shortest, fast, slow = 0, 0, 1 << 60, np.inf, 0.0
     first = 0
     for i in range(1, sizes.size + 1):
         if i < sizes.size and abs(sizes[i] - sizes[first]) <= ALIKE * sizes[first] + 1.5:
@@ -102,6 +103,7 @@ def _rows(sizes: NDArray[np.int64]) -> tuple[int, int, int, int]:
             rates += 1
             covered += i - first
             shortest = min(shortest, sizes[first])
-            longest = max(longest, sizes[first])
+            mean = sizes[first:i].mean()
+            fast, slow = min(fast, mean), max(slow, mean)
         first = i
-    return rates, covered, shortest, longest
+    return rates, covered, shortest, fast, slow

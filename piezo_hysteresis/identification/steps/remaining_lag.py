@@ -108,7 +108,7 @@ def lag_notices(fit: Fit, contents: Sequence[ExcitationContent], *, rivals_count
     """
     value, error = lag(fit)
     driven = moving(contents)
-    highest = max([c.bandwidth for c in driven if not c.is_step] or [0.0])
+    highest = max([c.highest for c in driven if not c.is_step] or [0.0])
     ends = f"no record is broadband and the drive ends at {highest:.3g} Hz" if highest else "no record is broadband"
     known_to = np.arcsin(STATED * np.sqrt(2.0)) / (np.pi * 1.96 * error) if error > 0.0 else np.inf
     besides = beyond = ""
