@@ -19,7 +19,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -29,6 +29,7 @@ from ..identification.structure.pieces import WEIGHTS, pieces_of
 from ..identification.structure.step_weights import shares_of_steps
 from ..model.model import Model
 from ..record import Record
+from .account import Account
 from .change_kinds import KINDS
 from .signatures import SHAPES, ChangeablePrediction, predictions
 
@@ -51,27 +52,6 @@ AROUND = 0.2
 """Range of the repeated search without some of the pieces, relative to the size or to one sample."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Account:
-    """One explanation: its cost, the V that remains, its parameters, and the RMS in floors per unit of each.
-
-    The cost is the remaining V and the penalties. Parameters are in the order of `names`.
-    """
-
-    key: str
-    cost: float
-    left: float
-    size: float
-    theta: Array
-    names: tuple[str, ...]
-    scale: Array
-
-    @property
-    def own(self) -> dict[str, float]:
-        """The parameters by name."""
-        return dict(zip(self.names, self.theta.tolist(), strict=True))
-
-
 class ChangeSearch:
     """Records, their prediction by the model, and explanations of the difference.
 
@@ -91,6 +71,7 @@ class ChangeSearch:
         self._records = records
         self.predicted, self.loop_share = predictions(model, records)
         self.used = list(used)
+        self._held: tuple[str, ...] = ()
         self.sides = ["gain"] + (["loop"] if "loop" in self.predicted[0].rows else [])
         pieces = [p for p in pieces_of(records, self.used) if p.origin in self.used]
         self._kinds = [p.kind for p in pieces]
@@ -106,6 +87,12 @@ class ChangeSearch:
         """The same search, with the same weights, around another model."""
         found = copy(self)
         found.predicted, found.loop_share = predictions(model, self._records)
+        return found
+
+    def more_cautious(self, factor: float, held: Sequence[str] = ()) -> ChangeSearch:
+        """The same search with floors larger by a factor, where the penalty of `held` has no limit."""
+        found = copy(self)
+        found.weights, found._floors, found._held = self.weights / factor, self._floors * factor, tuple(held)
         return found
 
     def _columns(self, key: str, size: float, names: Sequence[str]) -> tuple[Array, Array]:
@@ -130,6 +117,19 @@ class ChangeSearch:
         """Weighted residual that an account leaves (n,), with a zero fitted in every record."""
         y, columns = self._columns(account.key, account.size, account.names)
         return self._weighted(self.measured - y - account.theta @ columns, root)
+
+    def residual(self, account: Account) -> Array:
+        """Weighted residual that an account leaves (n,)."""
+        return self._left(account, self.weights)
+
+    def directions(self, account: Account, near: float) -> Array:
+        """Change of the weighted prediction per unit of a size, and of gain and loop height beside it (1 + sides, n).
+
+        `near` is the step of the difference quotient of the size.
+        """
+        before, after = (self._left(replace(account, size=account.size + s * near), self.weights) for s in (-1.0, 1.0))
+        _, columns = self._columns(account.key, account.size, self.sides)
+        return np.vstack(((before - after) / (2.0 * near), self._weighted(columns, self.weights)))
 
     def account(
         self, key: str, size: float = 0.0, free: Sequence[str] = (), mask: NDArray[np.bool_] | None = None
@@ -172,7 +172,7 @@ class ChangeSearch:
             other = row.copy()
             other[names.index("loop")] = -self.loop_share * row[names.index("gain")]
             rows.append(other)
-        return rows if key == "none" else [*rows, np.zeros(len(names))]
+        return rows if key == "none" or name in self._held else [*rows, np.zeros(len(names))]
 
     def discount_steps(self, account: Account) -> None:
         """Give a step that the account describes worse than all other motion less weight."""

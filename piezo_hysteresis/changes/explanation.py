@@ -24,7 +24,8 @@ import numpy as np
 from ..effects import AmplifierBandwidth, ExtraResonance
 from ..identification.steps.remaining_lag import amplifier_of
 from ..model.model import Model
-from .change_search import Account, ChangeSearch
+from .account import Account
+from .change_search import ChangeSearch
 from .signatures import shaped_model
 
 MOVED = (0.75, 0.8, 0.85, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1, 1.15, 1.2, 1.27, 1.35)

@@ -31,8 +31,9 @@ from ..effects import Softening
 from ..identification.records.noise_floor import ADEQUATE
 from ..model.model import Model
 from ..record import Record
+from .account import Account
 from .change_kinds import KINDS, LEAVES, ParameterChange
-from .change_search import DAY_TO_DAY, FARTHEST, Account, ChangeSearch
+from .change_search import DAY_TO_DAY, FARTHEST, ChangeSearch
 from .explanation import Explanation, half_interval, low_pass_before, moved_resonance
 from .signatures import AVERAGE, SECOND_ORDER, SHAPES, shaped_model
 

@@ -43,16 +43,18 @@ from ..model.model import Model
 from ..model.provenance import LARGEST, MOVING, known_error, with_origin
 from ..record import CONDITIONING, Experiment, Notice, Record
 from .change_kinds import ParameterChange
-from .change_search import AROUND, Account, ChangeSearch
+from .change_search import ChangeSearch
 from .changed_model import changed_model
-from .explanation import UNCERTAIN, half_interval
+from .joint_fit import JointFit, fit_jointly
 from .moved_group import is_as_good
-from .parameter_changes import SEEN, is_sure
 
 Array = NDArray[np.float64]
 
 LARGEST_FACTOR = 10.0
 """Gain relative to that of the model, or its reciprocal, from which the records are not those of the same stage."""
+
+LAG_OR_LOOP = "lag_or_loop_height"
+"""Kind of the notice that the records hardly distinguish a lag from a loop height."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -79,7 +81,7 @@ class Recalibration:
         The same of the old model, as it states it, or the noise floor of the records if it is larger [% of range]; 0 if
         it states none. A mean over kinds of drive is no measure for new records of one kind.
     notices : tuple of Notice
-        What was corrected in the records.
+        What was corrected in the records, and what they hardly distinguish.
     """
 
     model: Model
@@ -136,7 +138,8 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     limits = np.maximum(least, known_error(model, MOVING)).tolist()
     search = ChangeSearch(model, records, used, limits)
     search.discount_steps(search.shaped("delay"))
-    best, intervals = _fitted(search)
+    joint = fit_jointly(search)
+    best, intervals = joint.account, joint.intervals_95
     session = search.session(best)
     change = ParameterChange("delay", best.size, intervals["lag"], (), best.cost, best.cost, session)
 
@@ -179,30 +182,8 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
         100.0 * rms / span,
         100.0 * float(by_new.max()) / span,
         100.0 * max(stated, float(np.sqrt(np.mean(least[used] ** 2)))) / span if stated else 0.0,
-        notices,
+        (*notices, *_unclear(joint, kept)),
     )
-
-
-def _fitted(search: ChangeSearch) -> tuple[Account, dict[str, tuple[float, float]]]:
-    """The fit of gain, loop height and lag, and their 95 % intervals; without a lag that is not certain."""
-    still, late = search.account("delay"), search.shaped("delay")
-    half, *beside = search.halves(late).tolist()
-    half = float(np.hypot(half, UNCERTAIN * np.sqrt(max(1.0, late.cost) / _curvature_of_lag(search, late))))
-    sure = still.cost - late.cost > SEEN**2 and is_sure(late.size, half)
-    best = late if sure else still
-    intervals = {"lag": (late.size - half, late.size + half)}
-    for name, jackknife in zip(search.sides, beside, strict=True):
-        side = half_interval(best, name, jackknife)
-        low, high = (search.stated(name, best.own[name] + s * side) for s in (-1.0, 1.0))
-        intervals["loop_height" if name == "loop" else name] = low, high
-    return best, intervals
-
-
-def _curvature_of_lag(search: ChangeSearch, late: Account) -> float:
-    """Half the second derivative of the cost by the lag [1/s²]."""
-    near = AROUND * min(p.record.sample_period for p in search.predicted)
-    rises = (search.account("delay", late.size + s * near).cost - late.cost for s in (-1.0, 1.0))
-    return max(0.5 * sum(rises) / near**2, float(np.finfo(np.float64).tiny))
 
 
 def _after_a_loop(records: Sequence[Record]) -> tuple[Record, ...]:
@@ -215,3 +196,15 @@ def _after_a_loop(records: Sequence[Record]) -> tuple[Record, ...]:
         cut += [replace(record[:samples], phase=CONDITIONING), record[samples:]] if samples else [record]
         lead = [*lead, record]
     return tuple(cut)
+
+
+def _unclear(joint: JointFit, kept: bool) -> tuple[Notice, ...]:
+    """What is said if the records hardly distinguish a lag from a loop height; `kept` says whether the fit is used."""
+    if not joint.is_blurred:
+        return ()
+    taken = "neither was changed" if not kept else "the lag was changed" if joint.account.size else "the lag was kept"
+    said = (
+        "these records hardly distinguish a changed lag from a changed loop height, so that both intervals are wide; "
+        f"{taken}. Records of a slow and of a fast drive together distinguish them"
+    )
+    return (Notice(LAG_OR_LOOP, said),)
