@@ -44,6 +44,8 @@ from .verdict import FEWEST_RECORDS, Conclusion, Verdict
 
 GIVEN_DIVERGES = "given_model_diverges"
 """Kind of the notice that the given model is not used."""
+AS_GOOD = "The given model is as good as when it was identified."
+"""First sentence of the reason if no change is visible."""
 RESAMPLED = "resampled"
 """Kind of the notice about records that are faster than the given model."""
 
@@ -110,7 +112,13 @@ def diagnose(
     # diverging trials have a large cost
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"), using_cores(cores):
         state = prepare(state)
-        return compared_with_given(_without_verdict(state) or _answer(_resampled(state)))
+        try:
+            return compared_with_given(_without_verdict(state) or _answer(_resampled(state)))
+        except IdentificationError as error:  # of the model that the diagnosis begins with
+            message = str(error)
+            if not message.startswith("identify:"):
+                raise
+            raise IdentificationError("diagnose" + message.removeprefix("identify")) from error
 
 
 def prepare(state: DiagnosisState) -> DiagnosisState:
@@ -200,5 +208,6 @@ def compared_with_given(found: Diagnosis) -> Diagnosis:
     """
     unchanged = any(n.kind == UNCHANGED_STAGE for n in found.experiment.notices)
     if unchanged and found.verdict is Verdict.UNKNOWN and found.conclusion is not Conclusion.TIME_LIMIT:
-        return replace(found, conclusion=Conclusion.NOTHING_CHANGED)
+        before = found.reason.replace("Something is missing that", "What it has missed since then is something that", 1)
+        return replace(found, conclusion=Conclusion.NOTHING_CHANGED, reason=f"{AS_GOOD} {before}")
     return found

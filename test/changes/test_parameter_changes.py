@@ -28,7 +28,7 @@ from piezo_hysteresis.changes.changed_model import changed_model
 from piezo_hysteresis.changes.parameter_changes import UNCHANGED, error_ratio, find_change
 from piezo_hysteresis.changes.recalibration import recalibrate
 from piezo_hysteresis.discrepancy import Conclusion, Diagnosis, Verdict, diagnose
-from piezo_hysteresis.discrepancy.diagnose import compare_with_given_model, compared_with_given, prepare
+from piezo_hysteresis.discrepancy.diagnose import AS_GOOD, compare_with_given_model, compared_with_given, prepare
 from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
 from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.free_run_error import errors, free_per_record
@@ -206,6 +206,9 @@ def test_diagnose_says_that_nothing_has_changed(model, another_day):
     found = diagnose(played(another_day), model)
     assert [n.kind for n in found.experiment.notices].count("unchanged") == 1
     assert found.conclusion is Conclusion.NOTHING_CHANGED
+    assert found.reason.startswith(AS_GOOD)
+    gap = replace(found, conclusion=Conclusion.UNEXPLAINED_GAP, reason="Something is missing that no effect explains.")
+    assert "Something is missing" not in compared_with_given(gap).reason, "the headline is that nothing has changed"
     ended = replace(found, conclusion=Conclusion.TIME_LIMIT)
     assert compared_with_given(ended).conclusion is Conclusion.TIME_LIMIT  # a longer search may find a name
     later = diagnose(played(replace(another_day, filter_pole=2e-3)), model)
