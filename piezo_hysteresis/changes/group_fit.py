@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import IdentificationError, PiezoError
+from ..identification.stage_check import EXCESS, is_as_good
 from ..model.model import Model
 from ..online.change.baseline import Baseline, drive_class
 from ..online.change.detector import directions
@@ -35,7 +36,7 @@ from ..online.change.false_alarm_threshold import WINDOW, false_alarm_threshold
 from ..online.change.scatter import Scatter, residual_power
 from ..online.change.score import BLOCK_TIME, GROUPS, ChangeScore
 from .minute import Minute
-from .moved_group import EXCESS, FULL, changed_by, is_as_good
+from .moved_group import FULL, changed_by
 
 Array = NDArray[np.float64]
 

@@ -14,9 +14,9 @@
 
 """`fit_jointly`: gain, loop height and lag of new records, each with an interval that contains what imitates it.
 
-In one sine a later response resembles a higher loop, because both widen the same ellipse. So neither interval is that of
-a stage whose other number is known. What the records leave open, the differences from day to day decide: gain and loop
-height may differ a little, and the lag stays unless the records show for certain that it changed.
+In one sine a later response resembles a higher loop, because both widen the same ellipse. So neither interval is that
+of a stage whose other number is known. What the records leave open, the differences from day to day decide: gain and
+loop height may differ a little, and the lag stays unless the records show for certain that it changed.
 """
 
 from __future__ import annotations

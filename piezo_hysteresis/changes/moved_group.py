@@ -29,15 +29,8 @@ from .signatures import shaped_model
 
 Array = NDArray[np.float64]
 
-EXCESS = 1.3
-"""Ratio of the RMS error to the known one from which a model is not as good as before."""
 FULL = "a full identification is needed"
 """Advice if the parameters of the groups are not sufficient."""
-
-
-def is_as_good(error: float, known: float) -> bool:
-    """Whether a model with this RMS error is as good as it was with the known one; both in the same unit."""
-    return error <= EXCESS * known
 
 
 def group_to_fit(groups: Sequence[str]) -> str:

@@ -25,28 +25,27 @@ both ends of its range. The samples up to there are neither fitted nor part of t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import Offset
 from ..errors import IdentificationError, ParameterError
-from ..identification.fit.normal_equations import Nuisance, residuals
-from ..identification.records.conditioning_split import conditioning_length, covers
-from ..identification.records.excitation_check import check_motion, moves
+from ..identification.fit.normal_equations import residuals
+from ..identification.records.excitation_check import check_motion
 from ..identification.records.noise import without_voltage_noise
 from ..identification.records.noise_floor import floors, stroke
 from ..identification.records.one_axis import one_axis
+from ..identification.stage_check import StageCheck, after_a_loop, check_stage, moving_in
 from ..model.model import Model
 from ..model.provenance import LARGEST, MOVING, known_error, with_origin
-from ..record import CONDITIONING, Experiment, Notice, Record
+from ..record import Experiment, Notice
 from .change_kinds import ParameterChange
 from .change_search import ChangeSearch
 from .changed_model import changed_model
 from .joint_fit import JointFit, fit_jointly
-from .moved_group import is_as_good
 
 Array = NDArray[np.float64]
 
@@ -98,8 +97,13 @@ class Recalibration:
 
     @property
     def is_as_good(self) -> bool:
-        """Whether the new model is as good as the old one was, by the criterion of the recalibration while running."""
-        return not self.known or is_as_good(self.largest, self.known)
+        """Whether the new model is as good as the old one was."""
+        return self.check.is_as_good
+
+    @property
+    def check(self) -> StageCheck:
+        """The errors of the new model, and the known one of the old model."""
+        return StageCheck(self.after, self.largest, self.known)
 
 
 def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
@@ -130,9 +134,8 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     axes_notices = one_axis(experiment)
     quiet, noise_notices = without_voltage_noise(experiment)
     notices = (*axes_notices, *noise_notices)
-    records = _after_a_loop(quiet.records)
-    used = [i for i, r in enumerate(records) if moves(r) and r.phase != CONDITIONING]
-    used = [i for i in used if not records[i].truncated] or used
+    records = after_a_loop(quiet.records)
+    used = moving_in(records)
     check_motion("recalibrate", [records[i] for i in used])
     least = floors(records)
     limits = np.maximum(least, known_error(model, MOVING)).tolist()
@@ -160,42 +163,22 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
             f"{beyond}, with a parameter beyond its bounds ({reason}); check stage, columns and units"
         ) from None
 
-    def by_record(candidate: Model) -> Array:
-        left = residuals(candidate, records, Nuisance(offset=True))
-        return np.asarray(np.sqrt([np.mean(left[i] ** 2) for i in used]))
-
-    single = by_record(model), by_record(fitted)
-    before, after = (float(np.sqrt(np.mean(s**2))) for s in single)
-    kept = after < before
-    new, by_new = (fitted, single[1]) if kept else (zeroed(model), single[0])
-    span = stroke(records)
-    rms = min(before, after)
-    stated = known_error(model, LARGEST)
+    before, after = (check_stage(m, quiet.records, known=model) for m in (model, fitted))
+    kept = after.percent < before.percent
+    new, errors = (fitted, after) if kept else (zeroed(model), before)
     return Recalibration(
-        with_origin(new, experiment, 100.0 * rms / span, float(by_new.max()), rms),
+        _with_errors(new, model, experiment, errors, stroke(records)),
         best.own["gain"] if kept else 0.0,
         search.stated("loop", best.own.get("loop", 0.0)) if kept else 0.0,
         best.size if kept else 0.0,
         {n: ends if kept else (min(ends[0], 0.0), max(ends[1], 0.0)) for n, ends in intervals.items()},
         new[Offset.name]["y0"],
-        100.0 * before / span,
-        100.0 * rms / span,
-        100.0 * float(by_new.max()) / span,
-        100.0 * max(stated, float(np.sqrt(np.mean(least[used] ** 2)))) / span if stated else 0.0,
+        before.percent,
+        errors.percent,
+        errors.largest,
+        errors.known,
         (*notices, *_unclear(joint, kept)),
     )
-
-
-def _after_a_loop(records: Sequence[Record]) -> tuple[Record, ...]:
-    """The records, cut where the drive has been at both ends of its range, so that the past no longer matters."""
-    cut: list[Record] = []
-    lead: list[Record] = []
-    for record in records:
-        lead = lead if record.continues else []
-        samples = 0 if lead and covers(lead, record) else conditioning_length(record)
-        cut += [replace(record[:samples], phase=CONDITIONING), record[samples:]] if samples else [record]
-        lead = [*lead, record]
-    return tuple(cut)
 
 
 def _unclear(joint: JointFit, kept: bool) -> tuple[Notice, ...]:
@@ -208,3 +191,14 @@ def _unclear(joint: JointFit, kept: bool) -> tuple[Notice, ...]:
         f"{taken}. Records of a slow and of a fast drive together distinguish them"
     )
     return (Notice(LAG_OR_LOOP, said),)
+
+
+def _with_errors(new: Model, old: Model, experiment: Experiment, errors: StageCheck, span: float) -> Model:
+    """The new model, which states its error on the new records, and what the old one was known to have.
+
+    On few records a model may be better than on others, so the error that counts as known does not become smaller. The
+    largest one remains that of the old model: otherwise a model that is worse would be as good as it is known to be.
+    """
+    moving = max(0.01 * errors.percent * span, known_error(old, MOVING))
+    largest = known_error(old, LARGEST) or 0.01 * errors.largest * span
+    return with_origin(new, experiment, errors.percent, largest, moving)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Recalibration from one record, which hardly distinguishes a lag from a loop height: what it changes, and what it says."""
+"""Recalibration from one record, which hardly distinguishes a lag from a loop height: what it changes and says."""
 
 from dataclasses import replace
 

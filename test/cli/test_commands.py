@@ -182,6 +182,9 @@ def test_recalibrate_says_whether_its_model_can_be_trusted(piezo, identified, fo
         assert ("does not describe this stage" in verdict) == bool(status)
         new = model_file.load(tmp_path / "new.yaml").provenance
         old = model_file.load(identified / "model.yaml").provenance
+        again = piezo("validate", tmp_path / "new.yaml", tmp_path / "run.npz")
+        assert again.status == status, "one criterion for both"
+        assert ("does not describe this stage" in again.out.splitlines()[-1]) == bool(status)
         ratio = float(new["free_run_error"]) / float(old["free_run_error"])
         assert ratio < 1.0 if column == "same" else ratio > 3.0, "the file states the real error"
     if column == "same":  # the history before the record is unknown, and hides no gain

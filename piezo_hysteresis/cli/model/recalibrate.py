@@ -20,11 +20,11 @@ import argparse
 
 import numpy as np
 
-from ...changes.moved_group import EXCESS, FULL
-from ...changes.recalibration import Recalibration, recalibrate
+from ...changes.moved_group import FULL
+from ...changes.recalibration import recalibrate
 from ...model import model_file
 from ...report.json_file import write_json
-from ...report.words import describes, error_sentence
+from ...report.stage_verdict import can_be_trusted, stage_sentence
 from ..options import reading_options
 from ..options.destination import add_results, require_new_results
 from ..terminal import console, show_notices
@@ -80,15 +80,6 @@ def run(args: argparse.Namespace) -> int:
     out.print(f"wrote {path}")
     severe = sum(notice.severe for notice in experiment.notices)
     caveat = f" Severe findings in the data make this doubtful: {severe}, see above." if severe else ""
-    out.print(f"Verdict: {_judged(found)}{caveat}", style="bold")
-    return 0 if describes(found.after) and found.is_as_good and not severe else 1
-
-
-def _judged(found: Recalibration) -> str:
-    """Whether the new model describes the stage as well as the old one did."""
-    if found.is_as_good or not describes(found.after):
-        return error_sentence(found.after)
-    return (
-        f"The model does not describe this stage: after the fit its error in one record is {found.largest:.3g} % of "
-        f"the range, expected at most {EXCESS:g} times the {found.known:.3g} % that it had; {FULL}."
-    )
+    cause = f": something else has changed, or the drive shows what the model misses; {FULL}."
+    out.print(f"Verdict: {stage_sentence(found.check, found.after, cause)}{caveat}", style="bold")
+    return 0 if can_be_trusted(found.check, found.after) and not severe else 1

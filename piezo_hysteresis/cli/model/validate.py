@@ -20,22 +20,21 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ...changes.moved_group import is_as_good
 from ...errors import RecordError
 from ...identification.free_run_error import Errors, free_per_record
 from ...identification.identified_range import outside
 from ...identification.records.comparable import comparable
+from ...identification.stage_check import check_stage
 from ...model import model_file
-from ...model.model import Model
-from ...model.provenance import LARGEST, known_error
 from ...record import CONDITIONING, Experiment
 from ...report.correlation import CAPTION, correlate
 from ...report.figures.comparison import ModelComparison, compare
 from ...report.json_file import write_json
+from ...report.stage_verdict import can_be_trusted, stage_sentence
 from ...report.tables.error_table import error_table, frequency_table
 from ...report.tables.table import Table
 from ...report.verdict import floor_sentence, is_at_floor
-from ...report.words import describes, error_sentence
+from ...report.words import describes
 from ..options import reading_options
 from ..options.destination import add_results, require_new_results
 from ..terminal import console, show, show_notices
@@ -80,13 +79,13 @@ def run(args: argparse.Namespace) -> int:
     show_notices((*experiment.notices, *conditioned, *beyond))
     if args.figures is not None:
         console().print(f"wrote figures to {args.figures}")
-    left, grown = _left(tests), _grown(model, now, bool(beyond))
-    if describes(now.percent) and not ((left or grown) and is_at_floor(comparison, now)):
+    left, check = _left(tests), check_stage(model, experiment.records)
+    if describes(now.percent) and not ((left or not check.is_as_good) and is_at_floor(comparison, now)):
         left = f" {floor_sentence(comparison, now)}{left}"
-    verdict = f"{error_sentence(now.percent)}{grown}{left}{_caveats(experiment)}"
+    verdict = f"{stage_sentence(check, now.percent, _cause(bool(beyond)))}{left}{_caveats(experiment)}"
     console().print(f"Verdict: {verdict}", style="bold")
     severe = any(notice.severe for notice in (*experiment.notices, *conditioned))
-    return 0 if describes(now.percent) and not severe else 1
+    return 0 if can_be_trusted(check, now.percent) and not severe else 1
 
 
 def _left(tests: list[dict[str, Any]]) -> str:
@@ -101,22 +100,12 @@ def _left(tests: list[dict[str, Any]]) -> str:
     )
 
 
-def _grown(model: Model, now: Errors, leaves_range: bool) -> str:
-    """That the error is larger than any that the model had when it was identified.
-
-    `leaves_range` says whether a drive is outside of what the model was identified on: the first cause to name.
-    """
-    known = 100.0 * known_error(model, LARGEST) / now.range
-    largest = max(row.percent for row in now.judged)
-    if not known or not describes(now.percent) or is_as_good(largest, known):
-        return ""
+def _cause(leaves_range: bool) -> str:
+    """Causes of an error that is larger than the known one; a drive outside the identified range comes first."""
     first = ": the"
     if leaves_range:
         first = ". The drive leaves the range that the model was identified on, which may be the cause. Otherwise the"
-    return (
-        f" In one phase it is {largest:.3g} %, {largest / known:.2g} times the largest that the model is known to "
-        f"have{first} stage has changed, or the drive shows what the model misses; see piezo diagnose --model."
-    )
+    return f"{first} stage has changed, or the drive shows what the model misses; see piezo diagnose --model."
 
 
 def _caveats(experiment: Experiment) -> str:
