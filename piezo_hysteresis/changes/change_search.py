@@ -242,7 +242,7 @@ class ChangeSearch:
         Groups of pieces or records are left out, and the wider one counts. A part without which little of the change
         remains is not used, nor for gain and loop height what hardly shows them: they would be those of the prior.
         """
-        numbers = np.unique(self.labels)
+        numbers = np.unique(self.labels[self.weights > 0.0])
         groups = [g for g in np.array_split(numbers, min(6, numbers.size)) if g.size]
         near = best.size if best.key in SHAPES else None
         whole = self.account("none").cost - best.cost

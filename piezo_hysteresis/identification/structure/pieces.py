@@ -43,6 +43,8 @@ EQUAL = 5
 """Number of equal pieces into which such a record is cut."""
 JUMP = 0.01
 """A change of the drive between two samples is a step if it is larger than this share of the range, and then held."""
+SLOWER = 1.001
+"""Ratio of two sample periods from which one is longer."""
 STILL = 1e-3
 """The drive counts as held while it stays within this share of its range."""
 
@@ -57,7 +59,7 @@ class Kind(StrEnum):
     LOOP = "loop"
     """It moves up and down at one rate and amplitude."""
     CONDITIONING = "conditioning"
-    """Anything, in a record that only determines the state of the stage and is not fitted."""
+    """Anything that only determines the state of the stage and is not fitted: a record, or the step of a slow one."""
 
 
 WEIGHTS = {Kind.STEP: 0.1, Kind.HOLD: 0.5, Kind.LOOP: 1.0, Kind.CONDITIONING: 0.0}
@@ -107,6 +109,9 @@ _Edge = tuple[int, Kind, int, int]
 def pieces_of(records: Sequence[Record], fitted: Collection[int]) -> list[RecordPiece]:
     """Cut every record into pieces. Records that are not in `fitted` only determine the state of the stage.
 
+    So do steps of a record that is slower than another one with a step: of the fast dynamics they show nothing that the
+    faster samples do not show better, and the model predicts slow samples of a step only as those of a delayed ramp.
+
     Parameters
     ----------
     records : sequence of Record
@@ -124,10 +129,23 @@ def pieces_of(records: Sequence[Record], fitted: Collection[int]) -> list[Record
             found += _cut(record, index, run, largest, before)
         else:
             found.append(RecordPiece(record, index, Kind.CONDITIONING, run=run))
+    found = _without_slow_steps(found)
     if any(p.kind is Kind.LOOP for p in found):
         return found
     # without any loop, the levels of the steps are what can be left out
     return [replace(p, kind=Kind.LOOP) if p.kind is Kind.HOLD else p for p in found]
+
+
+def _without_slow_steps(pieces: list[RecordPiece]) -> list[RecordPiece]:
+    """The pieces, where slow steps beside faster ones are not fitted, unless nothing else of their record would be."""
+    finest = min((p.record.sample_period for p in pieces if p.kind is Kind.STEP), default=np.inf)
+    moving = {p.origin for p in pieces if p.kind in (Kind.HOLD, Kind.LOOP)}
+    return [
+        replace(p, kind=Kind.CONDITIONING)
+        if p.kind is Kind.STEP and p.origin in moving and p.record.sample_period > SLOWER * finest
+        else p
+        for p in pieces
+    ]
 
 
 def _cut(record: Record, index: int, run: int, largest: float, before: float) -> list[RecordPiece]:
