@@ -50,10 +50,27 @@ class ExtraResonance(Effect):
 
     Notes
     -----
-    The block is exact for an input that is linear between samples. The start value of f0 is the peak of |E(f)|/|Y(f)|,
-    the ratio of the spectra of residual and displacement. The fitted r is larger than the true share of the mode, by up
-    to 9 times at 0.45 cycles per sample, because the hold of the converter and the interpolation of a delay reduce the
-    response near this frequency.
+    The block is exact for an input that is linear between samples (first-order hold). The start value of f0 is the peak
+    of |E(f)|/|Y(f)|, the ratio of the spectra of residual and displacement.
+
+    The fitted r, and its interval, are those of this form, as a prediction needs them. A converter that holds its value
+    excites the mode more, by 1/sinc(f0 T). The interpolation of a delay reduces the response by L(f0), and poles of the
+    dynamics that the stage has not reduce it by P(f0). The fit makes up for this: r is the true share divided by
+    sinc(f0 T) L(f0) P(f0), and smaller by a true pole that the model does not have. Fitted to stages that ring as a
+    whole, so that the true share is 1, with delays of 0 to 4 samples, poles of 0 to T, steps, and sines up to 0.006/T:
+
+    ======  =================  =================  =========================
+    f0 T    r, up to one pole  r, with two poles  half of its 95 % interval
+    ======  =================  =================  =========================
+    ≤ 0.05  1.00                                  0.01 to 0.02
+    0.1     1.01 to 1.02                          0.01 to 0.02
+    0.2     1.03 to 1.11       1.31               0.02 to 0.08
+    0.3     1.04 to 1.43       1.94               0.02 to 0.14
+    0.4     2.7                                   0.24
+    ======  =================  =================  =========================
+
+    At 0.45, r is up to 9. The formula holds within 1 % of r, and within 3 % with a pole before the hysteresis if this
+    counts as that of the stage. The intervals of f0 and ζ held the true ones; f0 was off by 0.02 % at most, and ζ by 0.5 %.
     """
 
     name = "extra_resonance"
@@ -65,7 +82,9 @@ class ExtraResonance(Effect):
     signature = "The stage rings at one frequency after steps. The ratio of residual to response has a peak there"
     source = "modes of the structure, ζ 0.005–0.03"
     parameters = (
-        Parameter("r", "r", "1", 0.0, -10.0, 10.0, "share of the mode", "modal superposition", 0.0, 0.02),
+        Parameter(
+            "r", "r", "1", 0.0, -10.0, 10.0, "share of the mode, first-order hold", "modal superposition", 0.0, 0.02
+        ),
         Parameter("f0", "f0", "Hz", 500.0, 1.0, 1e5, "natural frequency", "modal superposition", scale=10.0),
         Parameter("zeta", "ζ", "1", 0.01, 1e-4, 1.0, "damping ratio", "0.005–0.03 in structures", scale=0.005),
     )
