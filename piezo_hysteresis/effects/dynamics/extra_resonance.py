@@ -70,7 +70,8 @@ class ExtraResonance(Effect):
     ======  =================  =================  =========================
 
     At 0.45, r is up to 9. The formula holds within 1 % of r, and within 3 % with a pole before the hysteresis if this
-    counts as that of the stage. The intervals of f0 and ζ held the true ones; f0 was off by 0.02 % at most, and ζ by 0.5 %.
+    counts as that of the stage. The intervals of f0 and ζ held the true ones; f0 was off by 0.02 % at most, and ζ by
+    0.5 %.
     """
 
     name = "extra_resonance"
