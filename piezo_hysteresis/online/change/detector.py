@@ -43,9 +43,6 @@ OFFSET_SCORES = 50
 _OFFSET = GROUPS.index("offset")
 """Row of the offset."""
 
-_TINY = float(np.finfo(np.float64).tiny)
-"""Smallest product of two numbers of information that counts as more than zero."""
-
 
 @dataclass(frozen=True, slots=True)
 class Change:
@@ -115,20 +112,15 @@ class ChangeDetector:
         del self._window[:-WINDOW]
         sums = [np.cumsum([row[k] for row in reversed(self._window)], axis=0) for k in (0, 1)]
         gradients, weights = beside_offset(*sums)
-        length = np.arange(1, len(gradients) + 1)[:, None]
-        variance = 1.0 + self._variance_of_baseline(weights)
-        if not self._same_offset:
-            variance = variance + _squared_cosine_to_offset(scatter) * length / OFFSET_SCORES
-        variance = variance * scatter.inflation(len(gradients)) + scatter.wander * weights
+        variance = self._variance(scatter, weights, scatter.wander)
         seen = scatter.excited & (weights > 0.0)
         statistic = np.where(seen, gradients**2 / np.where(seen, weights, 1.0) / variance, 0.0)
         at, largest = np.unravel_index(int(statistic.argmax()), statistic.shape)
-        alone = gradients[at] ** 2 / np.where(seen[at], weights[at], np.inf)
-        if largest == _OFFSET:  # a change of another group moves the offset, too
-            alone = sums[0][at] ** 2 / np.where(seen[at], np.diag(sums[1][at]), np.inf)
-        else:
-            alone[_OFFSET] = 0.0
-        group = int(alone.argmax())
+        candidates = seen[at] & (np.arange(len(GROUPS)) != _OFFSET)
+        if largest == _OFFSET:  # a change of another group, beside the same offset, moves it, too
+            gradients, weights, candidates = sums[0], np.diagonal(sums[1], axis1=1, axis2=2), seen[at]
+            variance = self._variance(scatter, weights, _drift(sums[1], scatter.wander))
+        group = int(np.argmax(gradients[at] ** 2 / np.where(candidates, weights[at], np.inf)))
         return Change(
             float(statistic[at, largest]) / self._threshold(key, scatter),
             _alike(group, sums[1][at]),
@@ -137,6 +129,14 @@ class ChangeDetector:
             self._window[-1 - int(at)][2] - round(BLOCK_TIME * 1e9),
             True,
         )
+
+    def _variance(self, scatter: Scatter, weights: Array, drift: Array) -> Array:
+        """Variance of the sums of the window over that of independent scores (n, 5), with a drift of the groups."""
+        length = np.arange(1, len(weights) + 1)[:, None]
+        variance = 1.0 + self._variance_of_baseline(weights)
+        if not self._same_offset:
+            variance = variance + _squared_cosine_to_offset(scatter) * length / OFFSET_SCORES
+        return variance * scatter.inflation(len(weights)) + drift * weights
 
     def _variance_of_baseline(self, weights: Array) -> Array:
         """Variance that the uncertain mean of the baseline adds to each sum of the window, relative to that of the sum.
@@ -160,20 +160,19 @@ class ChangeDetector:
 
 
 def _alike(group: int, weight: Array) -> tuple[str, ...]:
-    """A group, and those that a sum of scores with the Fisher information `weight` (5, 5) cannot distinguish from it.
-
-    Two groups are alike if they are so with a known offset, or with an unknown one.
-    """
-    beside = weight - np.outer(weight[_OFFSET], weight[_OFFSET]) / weight[_OFFSET, _OFFSET]
-    cosine = np.maximum(_cosines(weight, group), _cosines(beside, group))
+    """A group, and those that a sum of scores with this Fisher information (5, 5) cannot distinguish from it."""
+    size = np.sqrt(np.diag(weight))
+    cosine = np.abs(weight[group]) / np.where(size > 0.0, size, np.inf) / size[group]
     others = [k for k in np.argsort(-cosine) if k != group and cosine[k] > ALIKE]
     return (GROUPS[group], *(GROUPS[k] for k in others))
 
 
-def _cosines(weight: Array, group: int) -> Array:
-    """Cosines between the directions of all groups and that of one; 0 where one of the two has no information."""
-    square = np.diag(weight) * weight[group, group]
-    return np.abs(weight[group]) / np.sqrt(np.where(square > _TINY, square, np.inf))
+def _drift(weights: Array, wander: Array) -> Array:
+    """Variance of the apparent change of each group (n, 5) by its own drift and by that of the offset."""
+    own = np.diagonal(weights, axis1=1, axis2=2)
+    share = weights[:, :, _OFFSET] / np.where(own > 0.0, own, np.inf)
+    share[:, _OFFSET] = 0.0
+    return wander + share**2 * wander[_OFFSET]
 
 
 def _squared_cosine_to_offset(scatter: Scatter) -> Array:
