@@ -155,7 +155,8 @@ class ChangeDetector:
 
     def _threshold(self, key: DriveClass, scatter: Scatter) -> float:
         if key not in self._thresholds:
-            self._thresholds[key] = false_alarm_threshold(directions(scatter), self._interval, scatter.memory)
+            tested = _apart_from_offset(directions(scatter))
+            self._thresholds[key] = false_alarm_threshold(tested, self._interval, scatter.memory)
         return self._thresholds[key]
 
 
@@ -165,6 +166,14 @@ def _alike(group: int, weight: Array) -> tuple[str, ...]:
     cosine = np.abs(weight[group]) / np.where(size > 0.0, size, np.inf) / size[group]
     others = [k for k in np.argsort(-cosine) if k != group and cosine[k] > ALIKE]
     return (GROUPS[group], *(GROUPS[k] for k in others))
+
+
+def _apart_from_offset(direction: Array) -> Array:
+    """The directions (5, 5) of the groups, those of the others without their part along that of the offset."""
+    offset = direction[_OFFSET]
+    along = direction @ offset / np.maximum(offset @ offset, np.finfo(np.float64).tiny)
+    along[_OFFSET] = 0.0
+    return np.asarray(direction - np.outer(along, offset))
 
 
 def _drift(weights: Array, wander: Array) -> Array:
