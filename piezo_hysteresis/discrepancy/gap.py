@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -183,15 +182,16 @@ def measure_gap(
         left = residuals_on(model, records, chosen, nuisance or free_per_record(model, offset=offset))
         return np.array([100.0 * float(np.sqrt(np.mean(e**2))) / stroke for e in left])
 
+    def square(model: Model) -> float:
+        try:
+            return float(np.mean((left_by(model) / least) ** 2))
+        except DivergenceError:
+            return np.inf
+
     least = 100.0 * np.array([floors[i] for i in chosen]) / stroke
     before = left_by(models[0])
     after = before if models[1] is models[0] else left_by(models[1])
     live = left_by(models[1], Nuisance(offset)) if MainsHum.name in models[1] else after
-    partial = []
-    for model in between:
-        partial.append(np.inf)
-        with suppress(DivergenceError):
-            partial[-1] = float(np.mean((left_by(model) / least) ** 2))
     squares = after**2
     mean, interval = float(squares.mean()), None
     if squares.size > 1:
@@ -209,5 +209,5 @@ def measure_gap(
         unseen=unseen,
         live=float(np.sqrt(np.mean(np.square(live)))),
         free_zeros=offset,
-        between=tuple(partial),
+        between=tuple(square(model) for model in between),
     )

@@ -19,30 +19,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.changes import slope_and_loop
-from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from benchmarks.changes import PERIOD, played, slope_and_loop
+from benchmarks.nanopositioner import Nanopositioner
 from piezo_hysteresis.changes.recalibration import LAG_OR_LOOP, recalibrate
 from piezo_hysteresis.identification.free_run_error import errors, free_per_record
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.record import Experiment
 
-PERIOD = 5e-4
 STAGE = Nanopositioner(mode=310.0, delay=2e-4, pole=2e-4)
-
-
-def played(stage):
-    drives = ((f"sine_{f:g}hz", growing_sine(f, PERIOD, (0.4, 0.7, 1.0))) for f in (1.0, 10.0, 60.0))
-    return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives))
 
 
 @pytest.fixture(scope="module")
 def model():
-    return identify(played(STAGE), memory=True).model
+    return identify(played(STAGE, triangles=False), memory=True).model
 
 
 @pytest.fixture(scope="module")
 def poor():
-    return identify(played(STAGE), memory=False).model
+    return identify(played(STAGE, triangles=False), memory=False).model
 
 
 def sine(stage, frequency, cycles, *, step=False):
@@ -59,7 +53,7 @@ def changed(**factors):
 
 
 def error_elsewhere(model, stage):
-    return errors(model, played(stage), free_per_record(model, offset=True)).percent
+    return errors(model, played(stage, triangles=False), free_per_record(model, offset=True)).percent
 
 
 @pytest.mark.parametrize("step", [False, True])
@@ -108,7 +102,7 @@ def test_a_fast_sine_shows_gain_loop_height_and_lag_together(model):
 
 
 def test_records_of_several_rates_distinguish_a_lag_from_a_loop_height(model):
-    found = recalibrate(model, played(changed(loop=1.05)))
+    found = recalibrate(model, played(changed(loop=1.05), triangles=False))
     assert LAG_OR_LOOP not in {n.kind for n in found.notices}
     low, high = found.intervals_95["loop_height"]
     assert 0.0 < low < 0.05 < high < 0.12

@@ -25,6 +25,7 @@ import numpy as np
 from ...record import Record, Samples
 from ..records.excitation_content import RINGS
 from ..records.leading_step import step_length
+from ..records.sampling import is_faster
 from ..records.steady_waves import find_turns
 
 SWING = 0.005
@@ -43,8 +44,6 @@ EQUAL = 5
 """Number of equal pieces into which such a record is cut."""
 JUMP = 0.01
 """A change of the drive between two samples is a step if it is larger than this share of the range, and then held."""
-SLOWER = 1.001
-"""Ratio of two sample periods from which one is longer."""
 STILL = 1e-3
 """The drive counts as held while it stays within this share of its range."""
 
@@ -138,11 +137,11 @@ def pieces_of(records: Sequence[Record], fitted: Collection[int]) -> list[Record
 
 def _without_slow_steps(pieces: list[RecordPiece]) -> list[RecordPiece]:
     """The pieces, where slow steps beside faster ones are not fitted, unless nothing else of their record would be."""
-    finest = min((p.record.sample_period for p in pieces if p.kind is Kind.STEP), default=np.inf)
+    steps = [p.record for p in pieces if p.kind is Kind.STEP]
     moving = {p.origin for p in pieces if p.kind in (Kind.HOLD, Kind.LOOP)}
     return [
         replace(p, kind=Kind.CONDITIONING)
-        if p.kind is Kind.STEP and p.origin in moving and p.record.sample_period > SLOWER * finest
+        if p.kind is Kind.STEP and p.origin in moving and any(is_faster(s, p.record.sample_period) for s in steps)
         else p
         for p in pieces
     ]
