@@ -40,7 +40,7 @@ from ..identification.records.noise_floor import floors, stroke
 from ..identification.records.one_axis import one_axis
 from ..identification.stage_check import StageCheck, after_a_loop, check_stage, moving_in
 from ..model.model import Model
-from ..model.provenance import LARGEST, MOVING, known_error, with_origin
+from ..model.provenance import LARGEST, MOVING, known_error, knows_unseen_records, with_origin
 from ..record import Experiment, Notice
 from .change_kinds import ParameterChange
 from .change_search import ChangeSearch
@@ -103,7 +103,7 @@ class Recalibration:
     @property
     def check(self) -> StageCheck:
         """The errors of the new model, and the known one of the old model."""
-        return StageCheck(self.after, self.largest, self.known)
+        return StageCheck(self.after, self.largest, self.known, knows_unseen_records(self.model))
 
 
 def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
@@ -201,4 +201,4 @@ def _with_errors(new: Model, old: Model, experiment: Experiment, errors: StageCh
     """
     moving = max(0.01 * errors.percent * span, known_error(old, MOVING))
     largest = known_error(old, LARGEST) or 0.01 * errors.largest * span
-    return with_origin(new, experiment, errors.percent, largest, moving)
+    return with_origin(new, experiment, errors.percent, largest, moving, knows_unseen_records(old))

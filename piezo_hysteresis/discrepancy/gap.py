@@ -112,8 +112,8 @@ class Gap:
         rows = (everywhere or self).per_phase
         after, moving = [p.after for p in rows], [p.after for p in rows if moves(experiment[p.index])]
         mean = float(np.sqrt(np.mean(np.square(moving or after))))
-        errors = (0.01 * experiment.range * max(error, self.live) for error in (max(after), mean))
-        return with_origin(model, experiment, self.live, *errors)
+        largest, mean = (0.01 * experiment.range * max(error, self.live) for error in (max(after), mean))
+        return with_origin(model, experiment, self.live, largest, mean, self.unseen)
 
     @property
     def _squares(self) -> tuple[float, float]:

@@ -28,7 +28,7 @@ from ..errors import DivergenceError, ModelError, ParameterError
 from ..identification.records.comparable import comparable
 from ..identification.records.noise_floor import floors, noise_floors, stroke
 from ..model.model import Model
-from ..model.provenance import LARGEST, MOVING, data_hash, known_error, record_errors
+from ..model.provenance import LARGEST, MOVING, data_hash, known_error, knows_unseen_records, record_errors
 from ..record import Experiment, Notice, Record
 from .diagnosis import Diagnosis
 from .gap import measure_gap
@@ -125,4 +125,5 @@ def _without_change(model: Model, records: Sequence[Record], used: Sequence[int]
 def _stated(before: Model, after: Model) -> Model:
     """The changed model; where its few numbers made it better than before, it may be so on these records only."""
     largest, moving = (max(known_error(model, key) for model in (before, after)) for key in (LARGEST, MOVING))
-    return replace(after, provenance={**after.provenance, **record_errors(largest, moving)})
+    unseen = knows_unseen_records(before)
+    return replace(after, provenance={**after.provenance, **record_errors(largest, moving, unseen)})

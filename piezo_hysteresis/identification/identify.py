@@ -220,7 +220,8 @@ def identify(
             Notice("not_identifiable", f"{a} and {b} are not determined separately; record whole loops", severe=True)
             for a, b, _ in correlated_pairs(joint, INSEPARABLE)
         ]
-    if not any(not p.is_fitted for p in phases):
+    unseen = not all(p.is_fitted for p in phases)
+    if not unseen:
         notices.append(
             Notice(
                 "nothing_held_out",
@@ -231,7 +232,7 @@ def identify(
         joint.model, joint, delay, dynamics, published, table, comparisons, phases, tuple(notices), structure
     )
     origin = provenance(experiment, found.free_run_error, found.free_run_percent)
-    errors = record_errors(max(p.rms for p in phases), found.moving_error)
+    errors = record_errors(max(p.rms for p in phases), found.moving_error, unseen)
     origin = {**origin, **errors, **identified_range(records, roles.fitted)}
     if not roles.broadband:
         origin |= identified_periods(records[i].sample_period for i in roles.fitted)

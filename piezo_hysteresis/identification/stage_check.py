@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.model import Model
-from ..model.provenance import LARGEST, known_error
+from ..model.provenance import LARGEST, known_error, knows_unseen_records
 from ..record import CONDITIONING, Record
 from .fit.normal_equations import residuals
 from .free_run_error import free_per_record
@@ -60,11 +60,14 @@ class StageCheck:
     known : float
         The same as the model states it, or the noise floor of the records if it is larger [% of range]; 0 if it states
         none.
+    unseen : bool
+        Whether a record that was not fitted is part of the known error, so that it holds for other records.
     """
 
     percent: float
     largest: float
     known: float
+    unseen: bool = True
 
     @property
     def is_as_good(self) -> bool:
@@ -87,11 +90,15 @@ def check_stage(model: Model, records: Sequence[Record], known: Model | None = N
     cut = after_a_loop(records)
     used = moving_in(cut)
     single, span = record_errors_of(model, cut, used), stroke(cut)
-    stated = known_error(model if known is None else known, LARGEST)
+    reference = model if known is None else known
+    stated = known_error(reference, LARGEST)
     floor = float(np.sqrt(np.mean(floors(cut)[used] ** 2)))
     rms = float(np.sqrt(np.mean(single**2)))
     return StageCheck(
-        100.0 * rms / span, 100.0 * float(single.max()) / span, 100.0 * max(stated, floor) / span if stated else 0.0
+        100.0 * rms / span,
+        100.0 * float(single.max()) / span,
+        100.0 * max(stated, floor) / span if stated else 0.0,
+        knows_unseen_records(reference),
     )
 
 

@@ -48,6 +48,7 @@ _PROVENANCE = {
     "free_run_error_percent": "% of the displacement range",
     "largest_record_error": "m; the largest rms of one record, fitted or left out",
     "moving_record_error": "m; rms in free run over the records in which the drive moves",
+    "unseen_records": "whether one of these records was not fitted; errors of fitted records alone are no prediction",
     "data_hash": "of the samples that were fitted",
     "date": "UTC",
     "voltage_min": "V; of the records that were fitted",

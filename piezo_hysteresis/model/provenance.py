@@ -34,9 +34,17 @@ MOVING = "moving_record_error"
 """Key of the free-run error over the records in which the drive moves. Rests have less, and lower the mean over all."""
 
 
-def record_errors(largest: float, moving: float) -> Mapping[str, str]:
-    """The largest RMS free-run error of a single record, and that over the records in which the drive moves [m]."""
-    return {LARGEST: repr(float(f"{largest:.6g}")), MOVING: repr(float(f"{moving:.6g}"))}
+UNSEEN = "unseen_records"
+"""Key of whether one of these errors is of a record that was not fitted. Errors of fitted records are usually less."""
+
+
+def record_errors(largest: float, moving: float, unseen: bool) -> Mapping[str, str]:
+    """The largest RMS free-run error of a single record, and that over the records in which the drive moves [m].
+
+    `unseen` says whether a record among them was not fitted.
+    """
+    stated = {LARGEST: repr(float(f"{largest:.6g}")), MOVING: repr(float(f"{moving:.6g}"))}
+    return {**stated, UNSEEN: "yes" if unseen else "no"}
 
 
 def known_error(model: Model, key: str) -> float:
@@ -65,7 +73,14 @@ def provenance(experiment: Experiment, error: float, percent: float) -> Mapping[
     }
 
 
-def with_origin(model: Model, experiment: Experiment, percent: float, largest: float, moving: float) -> Model:
+def knows_unseen_records(model: Model) -> bool:
+    """Whether the errors that a model states include that of a record that was not fitted."""
+    return model.provenance.get(UNSEEN) == "yes"
+
+
+def with_origin(
+    model: Model, experiment: Experiment, percent: float, largest: float, moving: float, unseen: bool
+) -> Model:
     """The model with the origin of its values and its errors in the provenance; what else it states stays.
 
     Parameters
@@ -78,9 +93,11 @@ def with_origin(model: Model, experiment: Experiment, percent: float, largest: f
         Free-run error in % of the range of the experiment.
     largest, moving : float
         Largest error of a record, and that over the records in which the drive moves [m].
+    unseen : bool
+        Whether a record among them was not fitted.
     """
     origin = provenance(experiment, 0.01 * percent * experiment.range, percent)
-    return replace(model, provenance={**model.provenance, **origin, **record_errors(largest, moving)})
+    return replace(model, provenance={**model.provenance, **origin, **record_errors(largest, moving, unseen)})
 
 
 def data_hash(experiment: Experiment) -> str:

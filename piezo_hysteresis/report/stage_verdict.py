@@ -21,8 +21,11 @@ from .words import describes, error_sentence
 
 
 def can_be_trusted(check: StageCheck, percent: float) -> bool:
-    """Whether a model with this error [% of range] describes the stage, as well as it is known to."""
-    return describes(percent) and check.is_as_good
+    """Whether a model with this error [% of range] describes the stage, as well as it is known to.
+
+    The error of fitted records does not bound that of others.
+    """
+    return describes(percent) and (check.is_as_good or not check.unseen)
 
 
 def stage_sentence(check: StageCheck, percent: float, cause: str) -> str:
@@ -44,8 +47,13 @@ def stage_sentence(check: StageCheck, percent: float, cause: str) -> str:
     """
     if check.is_as_good or not describes(percent):
         return error_sentence(percent)
+    ratio = f"{check.largest:.3g} %, {check.largest / check.known:.2g} times the largest"
+    if not check.unseen:
+        return (
+            f"{error_sentence(percent)} In one record it is {ratio} of the records that were fitted, of which none was "
+            f"left out{cause}"
+        )
     return (
         f"The model does not describe this stage as well as it is known to: its error in free run is {percent:.3g} % "
-        f"of the range, and in one record {check.largest:.3g} %, {check.largest / check.known:.2g} times the largest "
-        f"that the model is known to have{cause}"
+        f"of the range, and in one record {ratio} that the model is known to have{cause}"
     )

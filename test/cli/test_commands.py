@@ -98,7 +98,12 @@ def late(tmp_path):
     period, time = 1e-3, 1e-3 * np.arange(2000)
     drive = np.concatenate((np.full(1000, 5.0), 5.0 + 4.0 * np.sin(2.0 * np.pi * time)))
     swing = Record(4.0 * np.sin(2.0 * np.pi * time), time, period, initial_voltage=0.0)
-    origin = {**identified_range((swing,), (0,)), "voltage_max": "9.0", "largest_record_error": "1e-9"}
+    origin = {
+        **identified_range((swing,), (0,)),
+        "voltage_max": "9.0",
+        "largest_record_error": "1e-9",
+        "unseen_records": "yes",
+    }
     stage = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=1.0)), period, 10.0, 1e-5, provenance=origin)
     record = Record(drive, np.zeros(drive.size), period, "step", initial_voltage=0.0)
     ringing = 1e-7 * np.exp(-time[:1000] / 0.1) * np.cos(600.0 * time[:1000])
@@ -118,6 +123,15 @@ def test_a_drive_outside_the_identified_range_is_the_first_cause_of_a_larger_err
     said = piezo("validate", model_file.save(known, model.with_name("known.yaml")), later).out.split("Verdict: ")[1]
     assert "have: the stage has changed" in said
     assert "leaves the range" not in said
+
+
+@pytest.mark.parametrize("unseen", [True, False])
+def test_the_error_of_fitted_records_does_not_bound_that_of_others(piezo, late, unseen):
+    model, later, stage = late
+    known = replace(stage, provenance={**stage.provenance, "unseen_records": "yes" if unseen else "no"})
+    done = piezo("validate", model_file.save(known, model.with_name("known.yaml")), later)
+    assert done.status == (1 if unseen else 0)
+    assert ("of which none was left out" in done.out) == (not unseen)
 
 
 def test_samples_that_only_determine_the_state_are_not_tested(piezo, late, tmp_path):

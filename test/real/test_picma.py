@@ -130,5 +130,7 @@ def test_the_commands_do_the_same(folder, tmp_path, capsys):
     assert main(["identify", str(folder / "Model_Vi_Do.dat"), *options, "--rows", "0:7000", "-o", model]) == 0
     assert "hysteresis_memory" in capsys.readouterr().out
     assert main(["validate", model, str(folder / "Test_Vi_Do_Di.dat"), *options, "--phase", "test"]) == 0
-    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("test "))
+    said = capsys.readouterr().out
+    assert "The model describes this stage" in said and "of which none was left out" in said, "all was fitted"
+    row = next(line for line in said.splitlines() if line.startswith("test "))
     assert float(row.split()[3]) <= 0.65
