@@ -24,6 +24,7 @@ import numpy as np
 
 from ..effects import CATALOGUE, Effect
 from ..errors import DivergenceError, IdentificationError, ParameterError
+from ..identification.cores import using_cores
 from ..identification.fit.fit import Progress
 from ..identification.inputs import experiment_of
 from ..identification.one_core import on_one_core
@@ -37,7 +38,6 @@ from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .many_records import diagnose_many
 from .same_stage import UNCHANGED_STAGE, same_stage
-from .search.cores import using_cores
 from .single_record import diagnose_few
 from .unnamed.correction import without_corrections
 from .verdict import FEWEST_RECORDS, Conclusion, Verdict

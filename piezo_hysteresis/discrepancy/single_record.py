@@ -26,6 +26,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from ..errors import PiezoError
+from ..identification.cores import start_helpers
 from ..identification.fit.cross_validation import Score
 from ..identification.fit.fit import Fit
 from ..identification.fit.time_limit import TimeSpentError, ending_at
@@ -34,6 +35,7 @@ from ..identification.records.conditioning import with_conditioning
 from ..identification.records.excitation_check import missing_excitation
 from ..identification.records.noise_floor import ADEQUATE, floors, noise_floors, noise_of_averages
 from ..identification.records.sampling import shortened
+from ..identification.start_models import as_conditioning
 from ..identification.structure.left_out import has_several_drives, score_left_out
 from ..identification.structure.structure_choice import LEADS
 from ..model.model import Model
@@ -43,9 +45,8 @@ from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .gap import Gap, measure_gap
 from .localise import located
-from .search.baseline import as_conditioning, with_zero
+from .search.baseline_setup import with_zero
 from .search.candidates import loop_is_off, score_model
-from .search.cores import start_helpers
 from .search.record_blocks import training_data_of
 from .search.refit import LAST, joint
 from .search.selection import select

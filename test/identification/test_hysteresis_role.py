@@ -23,7 +23,7 @@ import pytest
 import piezo_hysteresis
 from piezo_hysteresis.blocks.block import Block
 from piezo_hysteresis.compensation import Inverse
-from piezo_hysteresis.discrepancy.search.baseline import exact
+from piezo_hysteresis.discrepancy.search.baseline_setup import exact
 from piezo_hysteresis.effects import (
     CATALOGUE,
     CHAIN,

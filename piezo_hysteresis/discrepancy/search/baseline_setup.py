@@ -26,8 +26,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...blocks.block import Array
+from ...effects import Offset
 from ...effects.extent import Extent
 from ...errors import DivergenceError
+from ...identification.cores import start_helpers
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.form_uncertainty import ADEQUACY
@@ -35,11 +37,10 @@ from ...identification.records.conditioning import records_to_fit
 from ...identification.records.intersample_error import intersample_error
 from ...identification.records.noise_floor import ADEQUATE, noise_floors, noise_of_averages, stroke
 from ...identification.records.sampling import at_period, common_period, less, shortened, slowed
+from ...identification.start_models import modal_models, start_models
 from ...model.model import Model
 from ...record import Record
-from .baseline import exact, modal_models, start_models
 from .candidates import score_baseline, score_model
-from .cores import start_helpers
 from .refit import FAILURES, LAST, PRECISE, joint
 from .selection_result import Selection
 from .training_data import TrainingData, choose_test_records
@@ -195,3 +196,19 @@ def better_fit(
                 if after.excess < share * score.excess:
                     return other, after
     return found, score
+
+
+def exact(model: Model) -> Model:
+    """The model with the exact loop, which accepts the terms of the catalogue, and with a sensor zero.
+
+    Raises
+    ------
+    ModelError
+        If a published loop has another exponent than n = 1, for which there is no exact step.
+    """
+    return with_zero(model.with_hysteresis(model.hysteresis.exact()) if model.has_hysteresis else model)
+
+
+def with_zero(model: Model) -> Model:
+    """The model with a sensor zero."""
+    return model if Offset.name in model else model.with_effect(Offset())

@@ -22,12 +22,12 @@ from functools import partial
 from typing import TypeVar
 
 from ...effects.effect import ChainPosition
+from ...identification.cores import on_cores
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Progress
 from ...identification.records.noise_floor import ADEQUATE
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate
-from .cores import on_cores
 from .refit import FIRST, LATER, from_all_starts, proceed, refit, restart
 
 LEAST_GAIN = 0.15

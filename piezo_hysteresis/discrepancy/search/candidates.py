@@ -32,12 +32,12 @@ import numpy as np
 from ...blocks.block import Array
 from ...effects import Arx, Effect, MainsHum, Offset
 from ...errors import DivergenceError, ModelError, ParameterError
+from ...identification.cores import on_cores
 from ...identification.fit.bounded_step import room_of
 from ...identification.fit.cross_validation import Score, cross_validate, indispensable
 from ...identification.fit.fit import Fit, gauge
 from ...identification.fit.normal_equations import Gram, grams
 from ...model.model import Model
-from .cores import on_cores
 from .training_data import TrainingData
 
 BY_COST = attrgetter("score.cost")

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from functools import partial, reduce
 
 from ...errors import DivergenceError, IdentificationError, ModelError, ParameterError
+from ...identification.cores import on_cores
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit, fit
 from ...identification.fit.time_limit import check_time
@@ -34,7 +35,6 @@ from ...identification.steps.linear_start import FEW_ITERATIONS, ITERATIONS, for
 from ...identification.steps.modes import identify_modes
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate, adjusted_numbers, score_model
-from .cores import on_cores
 from .training_data import TrainingData
 
 LINEAR = ("lag", "dynamics")

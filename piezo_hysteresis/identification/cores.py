@@ -15,8 +15,8 @@
 """`on_cores`: a loop whose items are independent; helper processes on the other cores compute items further ahead.
 
 The results are the same, bit for bit, as without helpers. An item that a helper cannot compute is computed here.
-Processes, because most of the time of a fit is spent in Python, where threads wait for each other. Nothing else of the
-search knows of processes.
+Processes, because most of the time of a fit is spent in Python, where threads wait for each other. Nothing else of a
+diagnosis knows of processes.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 
-from ...identification.fit.time_limit import end_of_search, ending_at
-from ...identification.one_core import on_one_core
+from .fit.time_limit import end_of_search, ending_at
+from .one_core import on_one_core
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 MOST = 4
-"""Largest number of cores that are used; loops of the search have about this number of long items."""
+"""Largest number of cores that are used; loops of a diagnosis have about this number of long items."""
 
 
 class _Helpers:

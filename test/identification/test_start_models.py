@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy.search import baseline_setup
-from piezo_hysteresis.discrepancy.search.baseline import exact, start_models
+from piezo_hysteresis.discrepancy.search.baseline_setup import exact
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.effects.extent import Extent
@@ -26,6 +26,7 @@ from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.identification.records.noise_floor import noise_floors
+from piezo_hysteresis.identification.start_models import start_models
 from piezo_hysteresis.identification.steps.linear_start import dynamics_of
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record

@@ -31,9 +31,9 @@ from piezo_hysteresis.discrepancy import diagnose
 from piezo_hysteresis.discrepancy.search.baseline_setup import prepare_baseline
 from piezo_hysteresis.discrepancy.search.candidate_refits import refit_candidates
 from piezo_hysteresis.discrepancy.search.candidates import screen
-from piezo_hysteresis.discrepancy.search.cores import on_cores, start_helpers, using_cores
 from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.errors import ParameterError
+from piezo_hysteresis.identification.cores import on_cores, start_helpers, using_cores
 from piezo_hysteresis.identification.fit.time_limit import (
     TimeSpentError,
     check_time,
@@ -46,7 +46,7 @@ OWN_SESSION = partial(os.getsid, 0)
 HELPER = """
 import operator, os, time
 from functools import partial
-from piezo_hysteresis.discrepancy.search.cores import on_cores, start_helpers, using_cores
+from piezo_hysteresis.identification.cores import on_cores, start_helpers, using_cores
 with using_cores(2):
     start_helpers()
     found = set()

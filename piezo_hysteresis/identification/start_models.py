@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The baseline: the published model with all its parameters fitted jointly.
+"""Starts for a joint fit of the published model, with dynamics of the order that its authors use.
 
 Missing effects can only be judged from a baseline that describes the data as well as the published model can. With
 dynamics of too low an order, any linear effect would improve it.
@@ -24,14 +24,16 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from ...effects import HYSTERESIS, Arx, Offset
-from ...errors import IdentificationError
-from ...identification.identify import identify
-from ...identification.records.roles import Roles, roles_of
-from ...identification.steps.delay import identify_delay
-from ...identification.steps.dynamics import delay_of
-from ...identification.steps.hysteresis import fit_hysteresis
-from ...identification.steps.linear_start import (
+from ..effects import HYSTERESIS, Arx
+from ..errors import IdentificationError
+from ..model.model import Model
+from ..record import CONDITIONING, Experiment, Record
+from .identify import identify
+from .records.roles import Roles, roles_of
+from .steps.delay import identify_delay
+from .steps.dynamics import delay_of
+from .steps.hysteresis import fit_hysteresis
+from .steps.linear_start import (
     FEW_ITERATIONS,
     ITERATIONS,
     dynamics_behind,
@@ -40,9 +42,7 @@ from ...identification.steps.linear_start import (
     hysteresis_signals,
     with_dynamics,
 )
-from ...identification.steps.modes import identify_modes
-from ...model.model import Model
-from ...record import CONDITIONING, Experiment, Record
+from .steps.modes import identify_modes
 
 ORDERS = (8, 8)
 """na and nb, as in the paper; coefficients that the data do not need stay at zero in the joint fit."""
@@ -128,19 +128,3 @@ def _delay_without_steps(model: Model, records: Sequence[Record], broadband: Col
         with suppress(IdentificationError):  # unstable dynamics do not determine the delay
             errors[delay] = dynamics_behind(model, records, broadband, delay, ORDERS).free_run_error
     return min(errors, key=errors.__getitem__, default=found)
-
-
-def exact(model: Model) -> Model:
-    """The model with the exact loop, which accepts the terms of the catalogue, and with a sensor zero.
-
-    Raises
-    ------
-    ModelError
-        If a published loop has another exponent than n = 1, for which there is no exact step.
-    """
-    return with_zero(model.with_hysteresis(model.hysteresis.exact()) if model.has_hysteresis else model)
-
-
-def with_zero(model: Model) -> Model:
-    """The model with a sensor zero."""
-    return model if Offset.name in model else model.with_effect(Offset())
