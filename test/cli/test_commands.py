@@ -55,6 +55,13 @@ def identified(folder, tmp_path_factory):
     return place
 
 
+def test_identify_names_the_phase_that_it_describes_worst(piezo, folder, tmp_path):
+    words = ("--orders", "3", "3", "-o", tmp_path / "model.yaml", "--json", tmp_path / "model.json")
+    said = piezo("identify", folder, *words).out.splitlines()[-1]
+    worst = max(json.loads((tmp_path / "model.json").read_text())["phases"], key=lambda p: p["percent_of_range"])
+    assert f"The error is largest in {worst['phase']}: {worst['percent_of_range']:.3g} % of range." in said
+
+
 def test_identify_writes_a_model_and_its_certainty(identified):
     answer = json.loads((identified / "model.json").read_text())
     model = model_file.load(identified / "model.yaml")

@@ -247,7 +247,7 @@ def test_a_parameter_at_a_bound_has_no_interval_and_the_result_counts(tmp_path):
 
     model = SimpleNamespace(row=lambda name: SimpleNamespace(off=None))
     fit = SimpleNamespace(converged=True, at_bounds=("arx.delay",), model=model, values={"arx.delay": 0.0})
-    said = verdict_line(SimpleNamespace(fit=fit, free_run_percent=0.3, notices=()))
+    said = verdict_line(SimpleNamespace(fit=fit, free_run_percent=0.3, notices=(), phases=()))
     assert said.endswith("At a bound of the range, and therefore without an interval: arx.delay.")
     for text in (piezo("--help").stdout, README.read_text(encoding="utf-8")):
         assert "1 if the result cannot be trusted" in " ".join(text.split())

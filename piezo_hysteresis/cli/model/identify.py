@@ -114,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def verdict_line(found: Identification) -> str:
-    """The result in one sentence."""
+    """The result in a few sentences. The mean error over the phases can hide one that is described badly."""
     fit, percent = found.fit, found.free_run_percent
     if not fit.converged:
         return (
@@ -127,7 +127,11 @@ def verdict_line(found: Identification) -> str:
     )
     names = ", ".join(undetermined(fit))
     at_bounds = f" At a bound of the range, and therefore without an interval: {names}." if names else ""
-    return f"Verdict: {error_sentence(percent)}{caveat}{at_bounds}"
+    largest = ""
+    if len(found.phases) > 1:
+        worst = max(found.phases, key=lambda p: p.percent)
+        largest = f" The error is largest in {worst.phase}: {worst.percent:.3g} % of range."
+    return f"Verdict: {error_sentence(percent)}{largest}{caveat}{at_bounds}"
 
 
 def answer(found: Identification, path: str) -> dict[str, Any]:
