@@ -38,13 +38,13 @@ from piezo_hysteresis.discrepancy.choice.time_to_decide import (
     missing_log_odds,
     z_of,
 )
-from piezo_hysteresis.discrepancy.search.acceptance_tests import KEEPS
 from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, refit_candidates
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate, screen
 from piezo_hysteresis.discrepancy.search.refit import without
 from piezo_hysteresis.discrepancy.search.selection import REFITS
 from piezo_hysteresis.discrepancy.search.selection_result import explained, typical
 from piezo_hysteresis.discrepancy.search.training_data import choose_test_records
+from piezo_hysteresis.discrepancy.verdict import NAMED
 from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
 from piezo_hysteresis.identification.protocol import protocol
@@ -207,7 +207,7 @@ def refitting(diagnosis: Diagnosis) -> Figure:
 
 
 def acceptance(diagnosis: Diagnosis) -> Figure:
-    """Step 8: gain and remaining error of every refit, beside the limits."""
+    """Step 8: gain of every refit beside its limit, and the error that remains."""
     assert diagnosis.selection is not None
     before, null = diagnosis.selection.steps[0].before, diagnosis.selection.null
     _, fitted = refits(diagnosis)
@@ -217,7 +217,8 @@ def acceptance(diagnosis: Diagnosis) -> Figure:
     gains.barh(at, [before.cost - c.score.cost for c in fitted], color=colours)
     gains.axvline(LEAST_GAIN, color=ORANGE, linestyle="--", label=f"limit: at least {LEAST_GAIN:g}")
     left.barh(at, [100.0 * (1.0 - explained(*typical(before, c.score), null)) ** 2 for c in fitted], color=colours)
-    left.axvline(100.0 * KEEPS, color=ORANGE, linestyle="--", label=f"limit: at most {100 * KEEPS:.0f} %")
+    least = 100.0 * (1.0 - NAMED) ** 2
+    left.axvline(least, color=ORANGE, linestyle="--", label=f"limit for a name: at most {least:.0f} %")
     alone = without(fitted[0])
     if alone is not None:
         mark = {"marker": "D", "linestyle": "none", "color": BLACK, "label": "beside the model refitted without it"}

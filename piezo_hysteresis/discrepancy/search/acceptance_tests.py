@@ -23,13 +23,7 @@ from ...identification.fit.cross_validation import Score
 from .candidate_refits import LEAST_GAIN
 from .candidates import FittedCandidate
 from .refit import without
-from .selection_result import Rejection, explained, typical
-
-KEEPS = 0.8
-"""Largest share of V beyond noise that may remain after an effect."""
-
-SHOWN = 0.005
-"""Smallest gain that a number with two decimals shows."""
+from .selection_result import Rejection
 
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
 """Smallest number of mains periods in a record, longest sample period in mains periods, smallest number of records."""
@@ -41,20 +35,14 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
     """First reason to reject a fitted candidate; None if it passes all tests. The cheap tests come first."""
     gain = before.cost - best.score.cost
     if gain < LEAST_GAIN:
-        lowers = f"lowers mean ln R² by {gain:.2f}" if gain >= SHOWN else "does not lower mean ln R²"
+        lowers = f"lowers mean ln R² by {max(gain, 0.0):.2f}"
         return Rejection(best.name, f"in cross-validation it {lowers}, and a decrease by {LEAST_GAIN:g} is needed")
-    left = (1.0 - explained(*typical(before, best.score), best.training_data.null)) ** 2
-    if left > KEEPS:
-        return Rejection(
-            best.name, f"{100 * left:.0f} % of the excess error remains, and {100 * KEEPS:.0f} % is allowed"
-        )
     if best.name == MainsHum.name and not is_steady(best):
         return Rejection(best.name, "its amplitude depends on the drive, which mains hum does not")
     alone = without(best)
     owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
     if owed < LEAST_GAIN:
-        gains = f"gains only {owed:.2f}" if owed >= SHOWN else "gains nothing"
-        return Rejection(best.name, f"it {gains} over the model that was refitted without it")
+        return Rejection(best.name, f"it gains only {max(owed, 0.0):.2f} over the model that was refitted without it")
     return None
 
 

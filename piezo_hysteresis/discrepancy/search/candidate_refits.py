@@ -34,14 +34,8 @@ LEAST_GAIN = 0.15
 """Smallest gain in mean ln max(1, R²) for which an effect is accepted."""
 CLOSE = 0.3
 """Largest lag of a rival behind the best candidate, as a share of the best gain."""
-AGAIN = 3
-"""Number of refits that are repeated with newly estimated dynamics."""
-RESTARTS = 4
-"""Largest number of refits of a candidate from other start values."""
 WORTHWHILE = 0.8
 """Ratio of the new to the old cost above which a refit is not repeated."""
-FEWEST_STARTS = 3
-"""Number of starts from which an effect of the loop has several minima."""
 TIE = 0.02
 """Difference in gain up to which the form and the effect with the fewest parameters are taken."""
 
@@ -59,8 +53,7 @@ def refit_candidates(
     refits = _collected(first, candidates, lambda c, found: not any(_is_far_behind(c, r, before) for r in found))
     refits.sort(key=BY_COST)
     progress("new estimate of the dynamics", 0.6)
-    best = refits[:AGAIN]
-    anew = _collected(_anew, best, lambda c, found: not (found and _is_far_behind(c, found[0], before)))
+    anew = _collected(_anew, refits, lambda c, found: not (found and _is_far_behind(c, found[0], before)))
     field = _replaced(refits, anew)
     progress("refits of the best candidates", 0.8)
     last = partial(settled, before=before)
@@ -100,8 +93,7 @@ def _settled(fit: Fitter, before: Score, candidate: Candidate) -> FittedCandidat
 def _bends_dynamics(candidate: Candidate) -> bool:
     """Whether the effect acts before the dynamics, which can imitate it, so that the cost has several minima."""
     effect = candidate.effect
-    many = len(type(effect).starts(candidate.training_data.extent)) >= FEWEST_STARTS
-    return effect.place is ChainPosition.DRIVE or (effect.host is not None and many)
+    return effect.place is ChainPosition.DRIVE or effect.host is not None
 
 
 def refits_of_twins(candidates: Sequence[Candidate], best: FittedCandidate, before: Score) -> list[FittedCandidate]:
@@ -131,7 +123,7 @@ def _is_close(candidate: Candidate, best: FittedCandidate, before: Score) -> boo
 
 def settled(candidate: FittedCandidate, before: Score) -> FittedCandidate:
     """The converged refit, repeated with new dynamics while this removes much of the remaining cost."""
-    for _ in range(RESTARTS):
+    while True:
         cost = candidate.fit.cost
         candidate = proceed(candidate)
         if candidate.score.excess <= ADEQUATE or before.cost - candidate.score.cost < 0.5 * LEAST_GAIN:

@@ -45,8 +45,6 @@ FIRST, LATER = 3, 9
 """Number of linearisations of a refit, before and after candidates far behind are dropped."""
 LAST, PRECISE = 25, 1e-4
 """Number of linearisations of a last fit, and relative decrease of the cost at convergence."""
-MODAL_GAIN = 0.1
-"""Gain from which a sum of modes is used as the dynamics."""
 FAILURES = (DivergenceError, IdentificationError, ModelError, ParameterError)
 """Errors with which a trial fit may end."""
 
@@ -138,7 +136,7 @@ def _behind_anew(
     broadband = training_data.broadband
     if not broadband:
         return None
-    found, best = list[Fitted](), None
+    found = list[Fitted]()
 
     def behind(dynamics: Dynamics) -> Fitted:
         anew = with_dynamics(model, dynamics.arx)
@@ -149,12 +147,9 @@ def _behind_anew(
         for iterations in choices:
             with suppress(*FAILURES):
                 found.append(behind(identify_arx(signals, *form_of(model), iterations)))
-        best = min(found, key=BY_COST, default=None)
         if ITERATIONS in choices:
-            modes = behind(identify_modes(signals, *form_of(model), ITERATIONS))
-            if best is None or modes.score.cost < best.score.cost - MODAL_GAIN:
-                best = modes
-    return best
+            found.append(behind(identify_modes(signals, *form_of(model), ITERATIONS)))
+    return min(found, key=BY_COST, default=None)
 
 
 def without(candidate: FittedCandidate) -> Fitted | None:

@@ -44,8 +44,6 @@ from .training_data import TrainingData
 
 REFITS = 6
 """Number of candidates that are refitted jointly."""
-HOPELESS = 0.02
-"""Linearised gain below which an effect that is not among the first two is not refitted."""
 MOST = 3
 """Largest number of effects."""
 
@@ -101,8 +99,7 @@ def _turn(
     twins = {e.name: t.name for e in effects for t in model.effects if e.is_twin_of(t)}
     absent = [e for e in effects if e.public_name() not in present and e.name not in twins]
     screened = screen(model, training_data, absent)
-    likely = [c for k, c in enumerate(screened[:REFITS]) if k < 2 or before.cost - c.score.cost > HOPELESS]
-    refits = _best_of_each(refit_candidates(model, likely, before, progress))
+    refits = _best_of_each(refit_candidates(model, screened[:REFITS], before, progress))
     if not refits:
         return None
     refits = _best_of_each([*refits, *refits_of_twins(screened, refits[0], before)])

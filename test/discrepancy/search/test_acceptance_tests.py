@@ -50,9 +50,9 @@ def scored(*ratios):
     ("before", "alone", "reason"),
     [
         ((1.05, 1.05), (9.0, 9.0), "lowers mean ln R² by 0.10, and a decrease by 0.15 is needed"),
-        ((1.0, 1.0), (9.0, 9.0), "does not lower mean ln R², and"),
+        ((1.0, 1.0), (9.0, 9.0), "lowers mean ln R² by 0.00, and"),
         ((1.0, 1.3), (9.0, 9.0), None),
-        ((9.0, 9.0), (1.0, 1.0), "gains nothing over the model that was refitted without it"),
+        ((9.0, 9.0), (1.0, 1.0), "gains only 0.00 over the model that was refitted without it"),
         ((9.0, 9.0), (9.0, 9.0), None),
         ((9.0, 9.0), None, None),
     ],
@@ -71,13 +71,6 @@ def test_an_effect_must_gain_also_over_the_model_that_was_refitted_without_it(mo
     monkeypatch.setattr(acceptance_tests, "without", lambda candidate: refitted)
     rejection = first_rejection(replace(drift, score=scored(1.0, 1.0)), scored(*before))
     assert rejection is None if reason is None else (rejection.name == "gain_drift" and reason in rejection.reason)
-
-
-def test_an_effect_that_leaves_most_of_the_error_is_rejected():
-    """C cannot see it: the logarithm counts a change of one record as much as that of a record with all of the gap."""
-    drift = fitted(GainDrift(g=0.05, tau=600.0), ("gain_drift.g", "gain_drift.tau"), np.eye(2))
-    rejection = first_rejection(replace(drift, score=scored(1.0, 29.0)), scored(3.0, 30.0))
-    assert "of the excess error remains" in rejection.reason
 
 
 @pytest.mark.parametrize(
