@@ -72,7 +72,7 @@ def identified_range(records: Sequence[Record], fitted: Collection[int]) -> Mapp
         LOWEST: voltages.min(),
         HIGHEST: voltages.max(),
         SLOWEST: min((m.slowest for m in moved if m.bandwidth > 0.0), default=0.0),
-        FASTEST: max((m.bandwidth for m in moved), default=0.0),
+        FASTEST: max((m.highest for m in moved), default=0.0),
         STEEPEST: max(_slew_rate(r) for r in chosen),
         STEEPEST_STEP: max(_largest_step(records[i], before[i]) / records[i].sample_period for i in fitted),
     }
@@ -116,9 +116,9 @@ def _outside_of(model: Model, record: Record, before: float) -> Iterator[Notice]
         said = f"the drive goes from {least:.3g} to {most:.3g} V, {known}"
         yield Notice("outside_amplitudes", said, record.phase)
     drive_moves = motion.span >= MOVES * (high - low)
-    if drive_moves and motion.bandwidth > FASTER * fastest > 0.0:
-        said = f"the drive reaches {motion.bandwidth:.3g} Hz, the model was identified up to {fastest:.3g} Hz"
-        yield Notice("outside_frequencies", said + _lag_error(model, motion.bandwidth), record.phase)
+    if drive_moves and motion.highest > FASTER * fastest > 0.0:
+        said = f"the drive reaches {motion.highest:.3g} Hz, the model was identified up to {fastest:.3g} Hz"
+        yield Notice("outside_frequencies", said + _lag_error(model, motion.highest), record.phase)
     if drive_moves and SLOWER * motion.slowest < slowest and motion.bandwidth > 0.0:
         said = f"the drive is as slow as {motion.slowest:.3g} Hz, the model was identified from {slowest:.3g} Hz"
         yield Notice("outside_frequencies", said, record.phase)
