@@ -72,3 +72,13 @@ def test_the_edge_does_not_hide_the_ringing_of_a_step_in_its_own_record():
     assert mode["f0"] == pytest.approx(stage.mode, rel=0.02)
     assert mode["zeta"] == pytest.approx(stage.zeta, rel=0.2)
     assert {p.phase: p.percent for p in found.phases}["step"] < 0.1
+
+
+def test_a_filter_beside_a_light_mode_is_no_largest_current():
+    """A slope that lets the step pass in 0.74 samples was stated; without it, poles describe the step as well."""
+    stage = Nanopositioner(mode=213.0, zeta=0.013, filter_twice=6e-4, seed=1)
+    found = identify(played(stage, 1.0, 60.0), memory=True)
+    assert "step_edge" not in {notice.kind for notice in found.notices}
+    assert lag_holds(found, stage, PERIOD)
+    free = free_per_record(found.model, offset=True)
+    assert errors(found.model, played(stage, 10.0), free).percent < 0.1

@@ -83,7 +83,11 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
             refused.append(limited)
     best = _with_second_mode(best, pieces, floors)
     best, *others = in_every_place(best, pieces, floors)
-    if AmplifierSlewLimitHeld.name not in best.model:
+    if AmplifierSlewLimitHeld.name in best.model:  # poles and modes that were found behind a slope may do without it
+        bare = fit_structure(best.model.without(AmplifierSlewLimitHeld.name), pieces, floors, held_by(best))
+        if not max(_shares_left(best, bare, pieces)) < SECOND:
+            best, others = bare, [*others, best]
+    else:
         # it may be as likely as a pole or a delay
         others += [*refused, late if best is start else with_slew_limit(best, pieces, floors)]
     fast = _with_two_more_orders(plain, best, pieces, floors)
