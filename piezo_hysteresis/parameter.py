@@ -36,6 +36,18 @@ def slew_text(rate: float, digits: int = 6) -> str:
     return f"{float(f'{rate:.{digits}g}'):.15g} V/s"
 
 
+def number_text(value: float, half: float | None = None) -> str:
+    """A number with four digits, or with more if half of its interval shows that it is known better.
+
+    >>> number_text(236.6539, 0.025), number_text(236.6539, 3.0), number_text(236.6539)
+    ('236.654', '236.7', '236.7')
+    """
+    digits = 4
+    if value and half and math.isfinite(value) and math.isfinite(half):
+        digits = max(digits, 2 + math.floor(math.log10(abs(value))) - math.floor(math.log10(half)))
+    return f"{value:.{min(digits, 15)}g}"
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """A named physical quantity with unit, value, bounds, meaning and source.

@@ -20,6 +20,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..parameter import number_text
 from .change_kinds import KINDS, LEAVES, ParameterChange
 
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
@@ -54,4 +55,5 @@ def _with_interval(numbers: Sequence[float], unit: str) -> str:
         factor, unit = 1e-9, "nm"
     value, *ends = (n / factor for n in numbers)
     low, high = sorted(ends)
-    return f"{value:.4g} {unit} (95 %: {low:.4g} to {high:.4g} {unit})"
+    shown, begin, end = (number_text(number, 0.5 * (high - low)) for number in (value, low, high))
+    return f"{shown} {unit} (95 %: {begin} to {end} {unit})"

@@ -24,6 +24,7 @@ from ..effects import Arx
 from ..html_table import html_table
 from ..model.model import Model
 from ..model.parameter_covariance import response_error
+from ..parameter import number_text
 from ..picture import Picture, picture_of
 from ..record import Experiment, Notice, Samples
 from .fit.fit import Fit
@@ -209,8 +210,9 @@ class Identification:
         assumed = assumed_numbers(self.model)
         for name, value in self.fit.values.items():
             if not name.startswith(f"{Arx.name}.") or name == f"{Arx.name}.delay":
-                sure = "" if name in assumed else f" ± {1.96 * self.fit.standard_errors[name]:.2g} (95 %)"
-                lines.append(f"{name:28s} {value:12.4g}{sure}")
+                half = None if name in assumed else 1.96 * self.fit.standard_errors[name]
+                sure = "" if half is None else f" ± {half:.2g} (95 %)"
+                lines.append(f"{name:28s} {number_text(value, half):>12s}{sure}")
         for phase in self.phases:
             message = "" if phase.is_fitted else "  not fitted"
             lines.append(f"{phase.phase:28s} {phase.percent:9.4f} % of range {phase.rms * 1e9:10.4g} nm{message}")

@@ -24,6 +24,7 @@ import numpy as np
 from ...effects import AmplifierBandwidth, AmplifierBandwidthHeld, Arx, ExtraResonance
 from ...errors import ParameterError
 from ...model.model import Model
+from ...parameter import number_text
 from ...record import Notice
 from ..fit.fit import Fit
 from ..records.excitation_content import ExcitationContent, moving
@@ -120,7 +121,7 @@ def lag_notices(fit: Fit, contents: Sequence[ExcitationContent], *, rivals_count
         Notice(
             "lag_only",
             f"{ends}, so only a lag is reported for the dynamics{besides}, "
-            f"{1e3 * value:.4g} ms ± {1.96e3 * error:.2g} ms (95 %); above "
+            f"{number_text(1e3 * value, 1.96e3 * error)} ms ± {1.96e3 * error:.2g} ms (95 %); above "
             f"{known_to:.2g} Hz, this uncertainty allows an error of more than {100 * STATED:.0f} % of the range; "
             f"{beyond}record noise or a chirp to identify the dynamics",
         )

@@ -20,6 +20,7 @@ from collections.abc import Iterator, Mapping
 from itertools import groupby
 from typing import Any
 
+from ...parameter import number_text
 from ..words import FLOOR
 from .table import Table
 
@@ -51,7 +52,8 @@ def _cells(parameters: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
             yield name, f"{len(values)} from {min(values):.4g} to {max(values):.4g}", ""
             continue
         (interval,) = (row.get("interval_95") for row in rows)
-        yield name, f"{values[0]:.4g}", f"{interval[0]:.4g} … {interval[1]:.4g}" if interval else ""
+        half = 0.5 * (interval[1] - interval[0]) if interval else None
+        yield name, number_text(values[0], half), " … ".join(number_text(end, half) for end in interval or ())
 
 
 def correction_table(answer: Mapping[str, Any]) -> Table | None:

@@ -23,6 +23,7 @@ from ...identification.fit.fit import Fit
 from ...identification.identification import scale_note
 from ...identification.structure.mode import assumed_numbers
 from ...model.model import Model
+from ...parameter import number_text
 from .table import Table
 
 ALIKE = 0.95
@@ -57,9 +58,10 @@ def parameter_table(model: Model, fit: Fit | None = None) -> Table:
                 shown = "fitted in each record" if row.per_record else _numbers(value)
                 rows.append((name, row.symbol, shown, "", row.unit, bounds, row.meaning))
                 continue
-            interval = f"± {sure[name]:.2g}" if name in sure and name not in (*hit, *assumed) else ""
+            half = None if name in (*hit, *assumed) else sure.get(name)
+            interval = "" if half is None else f"± {half:.2g}"
             message = f"{bounds}: at a bound" if name in hit else bounds
-            rows.append((name, row.symbol, f"{value:.4g}", interval, row.unit, message, row.meaning))
+            rows.append((name, row.symbol, number_text(value, half), interval, row.unit, message, row.meaning))
     note = f"{scale_note(model)} Do not compare them with those of a model that has other scales."
     if Arx.name in model:
         note += (

@@ -69,6 +69,16 @@ def test_parameters_show_intervals_bounds_hit_and_correlations(models):
     assert correlation_table(fitted(model, names, np.diag(np.diag(covariance)))) is None
 
 
+def test_a_number_is_shown_as_exactly_as_its_interval(models):
+    """A mode at 236.654 Hz that is known within 0.025 Hz was shown as 236.7 ± 0.025 Hz."""
+    model = models["with creep"].with_values({"bouc_wen.p2": 0.8765432})
+    half = 2.5e-5
+    table = parameter_table(model, fitted(model, ("bouc_wen.p2",), np.array([[(half / 1.96) ** 2]])))
+    (row,) = (row for row in table.rows if row[0] == "bouc_wen.p2")
+    assert row[3] == "± 2.5e-05"
+    assert abs(float(row[2]) - 0.8765432) < 0.1 * half
+
+
 def test_a_long_array_leaves_room_for_the_table():
     weights = tuple(0.01 * k for k in range(16))
     model = Model((BoucWen(), HysteresisMemory(c=weights), Arx(a=(), b=(1.0,), delay=1.0)), 1e-3)
