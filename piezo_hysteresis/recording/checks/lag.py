@@ -48,9 +48,9 @@ _JUMP = 0.3
 """Largest step of the drive beside a turning point, share of the swing."""
 _BENT = 0.01
 """Lag that a bent loop may show, share of the swing."""
-_SLOWER, _ALIKE, _SHARED = 10.0, 1.2, 2.0
-"""Records for comparison have swings longer than the first value times the lag and the second times the own swing; the
-third is the largest ratio of a lag to theirs."""
+_SLOWER, _SHARED = 5.0, 2.0
+"""Smallest ratio of the swing of another record to a lag that it would show, and largest ratio of a lag to that of
+another record."""
 _SLOW = 20e-3
 """A drive that turns faster [s] may pass a resonance, behind which a lag of over half a period looks like a lead."""
 
@@ -119,7 +119,8 @@ def lag_of(record: Record) -> Lag | None:
 def lag_notices(records: Sequence[Record]) -> list[Notice]:
     """Notices ``leads`` where the displacement moves before the drive does, ``late`` where it lags beyond `LATE`.
 
-    A delayed channel and a slow filter have the same lag in all slow records; the curvature of a loop does not.
+    A shifted channel and a slow filter have the same lag in all slow records. What bends a loop, such as a limit of the
+    amplifier, or hum does not, so a lag that another record contradicts is no notice.
     """
     lags = [lag_of(record) for record in records]
     notices = []
@@ -127,18 +128,25 @@ def lag_notices(records: Sequence[Record]) -> list[Notice]:
         if lag is None:
             continue
         samples = f"{abs(lag.time):.3g} s ({abs(lag.time) / record.sample_period:.2g} samples)"
-        uncertainty = _SURE * lag.error
-        least = max(uncertainty, 2.0 * _BENT * lag.swing)
-        peers = [o for o in lags if o is not None and _SLOWER * lag.time < o.swing <= _ALIKE * lag.swing]
-        shared = min((max(o.time, 0.0) + _SURE * o.error for o in peers), default=lag.time)
-        if lag.time < -max(least, 0.5 * record.sample_period) and lag.swing > _SLOW:
+        size, uncertainty = abs(lag.time), _SURE * lag.error
+        peers = [o for o in lags if o is not None and o.swing > _SLOWER * size]
+        sign = np.copysign(1.0, lag.time)
+        shared = min((max(sign * o.time, 0.0) + _least(o) for o in peers), default=size)
+        if size - uncertainty >= _SHARED * shared:
+            continue
+        if lag.time < -max(_least(lag), 0.5 * record.sample_period) and lag.swing > _SLOW:
             text = f"the displacement leads the voltage by {samples}; one channel is shifted, or both are swapped"
             notices.append(Notice("leads", text, record.phase, severe=True))
-        elif lag.time > max(LATE, least) and lag.time - uncertainty < _SHARED * shared:
+        elif lag.time > max(LATE, _least(lag)):
             cause = "check for a slow sensor filter, a delayed channel or a wrong time base"
             text = f"the displacement lags the voltage by {samples}; {cause}"
             notices.append(Notice("late", text, record.phase))
     return notices
+
+
+def _least(lag: Lag) -> float:
+    """Smallest lag that is certain beside noise and a bent loop [s]."""
+    return max(_SURE * lag.error, 2.0 * _BENT * lag.swing)
 
 
 def _between(values: Samples, place: Samples) -> Samples:

@@ -88,3 +88,25 @@ def test_a_drive_above_the_resonance_does_not_lead():
 def test_a_staircase_of_block_averages_does_not_lead():
     voltage = np.repeat([0.0, 2.0, 4.0, 6.0, 8.0, 6.0, 4.0, 2.0, 0.0, 5.0, 9.0, 0.0], 200)
     assert "leads" not in kinds(voltage, 1e-6 * voltage, 0.1, "staircase")
+
+
+@pytest.mark.parametrize(("limit", "hum"), [(9.2, 0.0), (100.0, 0.003)])
+def test_a_lead_that_another_record_contradicts_is_no_shifted_channel(limit, hum):
+    """A limit of the amplifier bends the largest loop, and hum a slow one; a shifted channel shifts all of them."""
+    time = np.arange(5000) * 2e-4
+    phases = []
+    for frequency, amplitude in ((2.0, 4.5), (10.0, 2.0), (50.0, 3.5)):
+        voltage = 5.0 - amplitude * np.cos(2 * np.pi * frequency * time)
+        over = np.maximum(voltage - limit + 0.8, 0.0)
+        drive = 0.1 * (voltage - over + 0.8 * np.tanh(over / 0.8))
+        state = 1.05 * drive - 0.05 * drive**3 + 0.5 * loop(drive, -0.75, 4.0, -0.8, 0.0, 0.0)
+        state += hum * np.sin(2 * np.pi * 50.0 * time + 0.44) + 5e-4 * np.random.default_rng(0).normal(size=time.size)
+        phases.append(Record(voltage, 1e-5 * state, 2e-4, f"sine_{frequency:g}hz"))
+
+    def leading(records, shift):
+        early = [Record(r.voltage[: -shift or None], r.displacement[shift:], 2e-4, r.phase) for r in records]
+        return {n.phase for n in inspect(Experiment(tuple(early))) if n.kind == "leads"}
+
+    assert not leading(phases, 0)
+    assert leading(phases, 30)  # a real shift
+    assert any(leading([record], 0) for record in phases)  # one record alone cannot tell
