@@ -18,6 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
@@ -122,6 +123,30 @@ def test_creep_beside_the_published_loop_is_named(creeping):
     assert found.names == ("creep",)
     assert found.gap.after < 0.1 * found.gap.before
     assert not any("creep" in n.message for n in found.experiment.notices if n.kind == "not_tested")
+
+
+def test_a_mode_beside_a_delay_has_its_own_frequency_and_damping():
+    """The lag of a mode that sines do not show before the search is part of the delay, until the mode is fitted."""
+    period, w0 = 5e-5, 2.0 * np.pi * 780.0
+    b, a, _ = cont2discrete(([w0**2], [1.0, 2.0 * 0.08 * w0, w0**2]), period)
+    held = Arx(a=tuple(a[1:]), b=tuple(b[0, 1:]), delay=4.0)  # the mode behind a converter that holds each value
+    chain = (BoucWen(A=-0.75, beta=4.0, gamma=-0.8, p1=-0.1, p2=2.1), held)
+    stage, rng = Model((Backlash(b=0.05), *chain), period, 10.0, 5e-6), np.random.default_rng(0)
+    large = ((1, 5.0, 4.5), (5, 5.0, 4.5), (20, 5.0, 4.5), (80, 5.0, 4.0), (200, 5.0, 2.0))
+    small = ((1, 5.0, 2.0), (5, 4.0, 2.0), (20, 3.0, 2.5), (80, 5.0, 1.0), (40, 5.0, 3.0))
+    records = []
+    for f, offset, amplitude in (*large, *small):
+        time = period * np.arange(int(max(0.25, 2.0 / f) / period))
+        u = offset - amplitude * np.cos(2.0 * np.pi * f * time)
+        still = Record(u, u, period, f"sine_{f}hz")
+        records.append(replace(still, displacement=stage.simulate(still)[0] + 4e-9 * rng.normal(size=u.size)))
+    found = diagnose(records)
+    rows = {row["name"]: row["parameters"] for row in found.effects()}
+    assert set(rows) == {"backlash", "extra_resonance"}
+    for name, true in (("f0", 780.0), ("zeta", 0.08), ("r", 1.0)):
+        low, high = rows["extra_resonance"][name]["interval_95"]
+        assert low <= true <= high
+    assert found.gap.after < 1.1 * found.gap.floor
 
 
 def test_the_time_limit_is_the_conclusion_if_it_ended_the_search(creeping):

@@ -82,18 +82,21 @@ class FittedCandidate(Candidate):
 
 
 def adjusted_numbers(model: Model, training_data: TrainingData) -> list[str]:
-    """Parameters that a joint fit adjusts: all except fixed ones, the delay, and those that are free per record.
+    """Parameters that a joint fit adjusts: all except fixed ones, a whole delay, and those that are free per record.
 
+    A delay of whole samples was found in the response to a step. A fraction of a sample was fitted, and goes on to be.
     `settling` of the offset is not adjusted if all records start at one level, because the data do not determine it.
     """
-    skipped = {f"{Arx.name}.delay", f"{MainsHum.name}.f"}
+    values, skipped = model.values(), {f"{MainsHum.name}.f"}
+    if float(values.get(f"{Arx.name}.delay", 0.0)).is_integer():
+        skipped.add(f"{Arx.name}.delay")
     if training_data.offset:
         skipped.add(f"{Offset.name}.y0")
     if training_data.offset or not training_data.begins_at_levels:
         skipped.add(f"{Offset.name}.settling")
     if loop_is_off(model):  # it stays off
         skipped |= {f"{model.hysteresis.name}.{n}" for n in model.hysteresis.memory_names}
-    rows = {n: model.row(n) for n in model.values() if n not in skipped}
+    rows = {n: model.row(n) for n in values if n not in skipped}
     return [n for n, row in rows.items() if not (row.fixed or row.per_record)]
 
 
