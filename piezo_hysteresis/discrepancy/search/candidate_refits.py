@@ -34,6 +34,8 @@ LEAST_GAIN = 0.15
 """Smallest gain in mean ln max(1, R²) for which an effect is accepted."""
 CLOSE = 0.3
 """Largest lag of a rival behind the best candidate, as a share of the best gain."""
+AGAIN = 3
+"""Number of refits that are repeated with newly estimated dynamics."""
 WORTHWHILE = 0.8
 """Ratio of the new to the old cost above which a refit is not repeated."""
 TIE = 0.02
@@ -53,7 +55,7 @@ def refit_candidates(
     refits = _collected(first, candidates, lambda c, found: not any(_is_far_behind(c, r, before) for r in found))
     refits.sort(key=BY_COST)
     progress("new estimate of the dynamics", 0.6)
-    anew = _collected(_anew, refits, lambda c, found: not (found and _is_far_behind(c, found[0], before)))
+    anew = _collected(_anew, refits[:AGAIN], lambda c, found: not (found and _is_far_behind(c, found[0], before)))
     field = _replaced(refits, anew)
     progress("refits of the best candidates", 0.8)
     last = partial(settled, before=before)
