@@ -25,6 +25,7 @@ from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
+from ..effects import ExtraResonance
 from ..errors import PiezoError
 from ..identification.cores import start_helpers
 from ..identification.fit.cross_validation import Score
@@ -34,6 +35,7 @@ from ..identification.identify import identify
 from ..identification.records.conditioning import with_conditioning
 from ..identification.records.excitation_check import missing_excitation
 from ..identification.records.noise_floor import ADEQUATE, floors, noise_floors, noise_of_averages
+from ..identification.records.roles import roles_of
 from ..identification.records.sampling import shortened
 from ..identification.start_models import as_conditioning
 from ..identification.structure.left_out import has_several_drives, score_left_out
@@ -77,6 +79,12 @@ REFITTED = "the saved model is the given one, fitted to these records; it explai
 """The same, if a refit of the given model is saved."""
 KEPT = "the given model is saved unchanged, because a fit to these records predicts what was left out hardly better"
 """The same, if the given model is saved."""
+
+ONLY_A_LAG = (
+    " Without a broadband record, the dynamics of the published model are only a lag, so that this resonance may be "
+    "the only one of the stage."
+)
+"""What is said of a resonance that the dynamics of the published model could contain."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -154,6 +162,8 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     missing = missing_excitation(records, used, shown)
     origin = CHOSEN if found else REFITTED if final.fit is not None else KEPT
     said = conclusion_of_few(selection, is_certain, before, gap, len(used), several, missing, origin)
+    if said[0] is Conclusion.MISSING_EFFECT and model is None and ExtraResonance.name in shown:
+        said = said[0], said[1] + ("" if roles_of(experiment).broadband else ONLY_A_LAG)
     everywhere = None
     if aside and final.model is not model:
         both_new = final.model, final.model

@@ -143,6 +143,7 @@ def test_a_mode_beside_a_delay_has_its_own_frequency_and_damping():
     found = diagnose(records)
     rows = {row["name"]: row["parameters"] for row in found.effects()}
     assert set(rows) == {"backlash", "extra_resonance"}
+    assert "this resonance may be the only one of the stage" in found.reason
     for name, true in (("f0", 780.0), ("zeta", 0.08), ("r", 1.0)):
         low, high = rows["extra_resonance"][name]["interval_95"]
         assert low <= true <= high
