@@ -111,8 +111,8 @@ class Gap:
         """
         rows = (everywhere or self).per_phase
         after, moving = [p.after for p in rows], [p.after for p in rows if moves(experiment[p.index])]
-        mean = float(np.sqrt(np.mean(np.square(moving or after))))
-        largest, mean = (0.01 * experiment.range * max(error, self.live) for error in (max(after), mean))
+        percent = max(after), float(np.sqrt(np.mean(np.square(moving or after))))
+        largest, mean = (0.01 * experiment.range * max(error, self.live) for error in percent)
         return with_origin(model, experiment, self.live, largest, mean, self.unseen)
 
     @property

@@ -54,7 +54,7 @@ _PROVENANCE = {
     "voltage_min": "V; of the records that were fitted",
     "voltage_max": "V",
     "frequency_min": "Hz; rate of the slowest drive between its steps",
-    "frequency_max": "Hz; 95 % of the power of dv/dt of the fastest drive between its steps lies below it",
+    "frequency_max": "Hz; rate of the fastest sine, or below which 95 % of the power of dv/dt of another drive lies",
     "slew_rate_max": "V/s; that of 99 % of the samples that move",
     "step_rate_max": "V/s; the largest between two samples",
     "lag_uncertainty": "s; half of the 95 % interval of the lag, which no broadband record shows",

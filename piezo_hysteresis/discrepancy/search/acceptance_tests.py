@@ -25,6 +25,9 @@ from .candidates import FittedCandidate
 from .refit import without
 from .selection_result import Rejection
 
+SHOWN = 0.005
+"""Smallest gain that a number with two decimals shows."""
+
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
 """Smallest number of mains periods in a record, longest sample period in mains periods, smallest number of records."""
 STEADY = 0.3
@@ -35,14 +38,15 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
     """First reason to reject a fitted candidate; None if it passes all tests. The cheap tests come first."""
     gain = before.cost - best.score.cost
     if gain < LEAST_GAIN:
-        lowers = f"lowers mean ln R² by {max(gain, 0.0):.2f}"
+        lowers = f"lowers mean ln R² by {gain:.2f}" if gain >= SHOWN else "does not lower mean ln R²"
         return Rejection(best.name, f"in cross-validation it {lowers}, and a decrease by {LEAST_GAIN:g} is needed")
     if best.name == MainsHum.name and not is_steady(best):
         return Rejection(best.name, "its amplitude depends on the drive, which mains hum does not")
     alone = without(best)
     owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
     if owed < LEAST_GAIN:
-        return Rejection(best.name, f"it gains only {max(owed, 0.0):.2f} over the model that was refitted without it")
+        gains = f"gains only {owed:.2f}" if owed >= SHOWN else "gains nothing"
+        return Rejection(best.name, f"it {gains} over the model that was refitted without it")
     return None
 
 

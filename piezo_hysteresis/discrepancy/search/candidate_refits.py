@@ -131,7 +131,7 @@ def settled(candidate: FittedCandidate, before: Score) -> FittedCandidate:
         if candidate.score.excess <= ADEQUATE or before.cost - candidate.score.cost < 0.5 * LEAST_GAIN:
             break
         candidate = restart(candidate, LATER)
-        if candidate.fit.cost > WORTHWHILE * cost:
+        if not candidate.fit.cost <= WORTHWHILE * cost:  # nor after a cost that is no number
             break
     return candidate
 
