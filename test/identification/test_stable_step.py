@@ -75,3 +75,20 @@ def test_the_other_parameters_take_their_best_values_for_poles_that_are_stable(s
 def test_a_step_to_stable_poles_is_taken_whole():
     minimum = np.array([0.1, 0.1, 0.1, -0.2, 0.3, 0.4])
     np.testing.assert_allclose(step_to(minimum)[0], minimum)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_step_leads_to_a_pole_whose_sensitivities_are_rounding_errors(seed):
+    """The rows of poles and zeros near 1 cancel: at 1 − 1e-9, one of them is 1e18 times what both change together."""
+    toward = np.poly([0.5, 1.0 - 1e-9])[1:] - MODEL["arx"].array("a")
+    step, _ = step_to(np.array([*toward, 0.1, -0.2, 0.3, 0.4]), seed)
+    assert np.abs(np.roots([1.0, *(MODEL["arx"].array("a") + step[:2])])).max() < 1.0 - 1e-6
+
+
+@pytest.mark.parametrize("radius", [1.0 - 1e-7, 1.0 - 1e-12])
+def test_a_model_whose_pole_is_there_already_keeps_it(radius):
+    model = stage((0.5, radius), radius - 1e-3, 1e-6, 5.0)
+    minimum = np.array([3.0, 2.0, 0.1, -0.2, 0.3, 0.4])
+    step = stable_step(model, FREE, np.eye(6), np.eye(6), minimum, ROOM)
+    assert np.abs(np.roots([1.0, *(model["arx"].array("a") + step[:2])])).max() <= radius
+    np.testing.assert_allclose(step[2:], minimum[2:])

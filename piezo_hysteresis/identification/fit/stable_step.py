@@ -28,6 +28,9 @@ from .bounded_step import bounded_step
 
 Array = NDArray[np.float64]
 
+LARGEST = 0.99999
+"""Largest radius of a pole to which a step leads, unless the model has a larger one. Nearer to 1, a zero cancels the
+pole almost completely, and what is left of its sensitivities is rounding errors."""
 SHORTEST = 1e-3
 """Share of a step of the poles from which it is not shortened further; then the poles are not changed."""
 
@@ -63,11 +66,14 @@ def stable_step(
 
     def is_stable(step: Array) -> bool:
         try:
-            model.with_values({names[i]: values[names[i]] + float(step[i]) for i in poles})
+            moved = model.with_values({names[i]: values[names[i]] + float(step[i]) for i in poles})
         except ParameterError:
             return False
-        return True
+        return moved.effect(Arx).pole_radius <= largest
 
+    if not poles:
+        return full
+    largest = max(LARGEST, model.effect(Arx).pole_radius)
     if is_stable(full):
         return full
     others = ~directions[poles].any(axis=0)
