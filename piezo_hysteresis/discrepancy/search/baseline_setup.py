@@ -33,7 +33,7 @@ from ...identification.cores import start_helpers
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.form_uncertainty import ADEQUACY
-from ...identification.records.conditioning import records_to_fit
+from ...identification.records.conditioning import path_of, records_to_fit
 from ...identification.records.intersample_error import intersample_error
 from ...identification.records.noise_floor import ADEQUATE, noise_floors, noise_of_averages, stroke
 from ...identification.records.sampling import at_period, common_period, less, shortened, slowed
@@ -126,7 +126,7 @@ def prepare_baseline(
     noise, span = noise_floors(records), stroke(records)
     at_full_rate = [r for r, g in zip(records, given, strict=True) if r.sample_period == g.sample_period]
     period = model.sample_period if model is not None else common_period(at_full_rate or records)
-    straight = tuple(at_period(r, period) for r in records)
+    straight = tuple(at_period(r, period) if i in usable else r for i, r in enumerate(records))
     noise, records = noise_of_averages(noise, records, straight), straight
     first = known.baseline if known is not None else model
     starts = iter((first,)) if first is not None else start_models(records, fitted)
@@ -172,11 +172,20 @@ def _floors(noise: Array, span: float, lost: Sequence[Array]) -> Array:
 def _short(
     records: Sequence[Record], noise: Array, lost: Sequence[Array], span: float, fitted: Collection[int], most: int
 ) -> tuple[tuple[Record, ...], Array, Array]:
-    """Training records with about `most` samples, their floors and their noise [m]."""
+    """Training records with about `most` samples, their floors and their noise [m].
+
+    A record that only determines the state of the next one becomes a path.
+    """
     short = shortened(records, most)
     noise = noise_of_averages(noise, records, short)
     kept, least = records_to_fit(short, _floors(noise, span, lost).tolist(), fitted)
-    return tuple(kept), np.array(least), np.array(records_to_fit(short, noise.tolist(), fitted)[1])
+    quiet = records_to_fit(short, noise.tolist(), fitted)[1]
+    parts = [
+        (part, floor, own)
+        for record, floor, own in zip(kept, least, quiet, strict=True)
+        for part in ((record,) if np.isfinite(floor) else path_of(record, most))
+    ]
+    return tuple(p for p, _, _ in parts), np.array([f for _, f, _ in parts]), np.array([n for _, _, n in parts])
 
 
 def better_fit(
