@@ -28,7 +28,7 @@ from ...identification.fit.fit import Progress
 from ...identification.records.noise_floor import ADEQUATE
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate
-from .refit import FIRST, LATER, from_all_starts, proceed, refit, restart
+from .refit import FIRST, LATER, LINEAR, from_all_starts, proceed, refit, restart
 
 LEAST_GAIN = 0.15
 """Smallest gain in mean ln max(1, R²) for which an effect is accepted."""
@@ -82,8 +82,12 @@ def _replaced(before: list[FittedCandidate], after: list[FittedCandidate]) -> li
 
 
 def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
-    """Refits of effects of the drive and the loop that the dynamics have absorbed, so that no score test shows them."""
-    bending = [c for c in candidates if _bends_dynamics(c)]
+    """Refits of effects of the drive and the loop that the dynamics have absorbed, so that no score test shows them.
+
+    At the floor, what remains is small, and the dynamics absorb only a lag.
+    """
+    is_far = before.excess > ADEQUATE
+    bending = [c for c in candidates if _bends_dynamics(c) and (is_far or c.effect.family in LINEAR)]
     return _collected(partial(_settled, partial(from_all_starts, model), before), bending)
 
 

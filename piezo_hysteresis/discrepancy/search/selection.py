@@ -32,6 +32,7 @@ from ...model.model import Model
 from .acceptance_tests import bends_all_along, first_rejection
 from .candidate_refits import (
     CLOSE,
+    LEAST_GAIN,
     finest,
     refit_candidates,
     refits_behind_new_dynamics,
@@ -73,7 +74,7 @@ def select(
     report = progress or (lambda word, fraction: None)
     baseline, steps, accepted, in_time = model, list[Step](), 0, False
     with suppress(TimeSpentError):
-        while score.excess > ADEQUATE and accepted < MOST:
+        while (score.excess > ADEQUATE or (accepted and score.cost > LEAST_GAIN)) and accepted < MOST:
             step = _turn(model, training_data, score, effects, report)
             if step is None:
                 break

@@ -1,0 +1,57 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Records that continue one another, as the nodes and `piezo simulate` record them: what is named, is as hidden."""
+
+import json
+
+import numpy as np
+import pytest
+
+from piezo_hysteresis.cli.main import main
+from piezo_hysteresis.discrepancy import diagnose
+from piezo_hysteresis.recording import read
+
+pytestmark = pytest.mark.soak
+CORNER = 10e3
+"""Corner of the amplifier of every simulated stage [Hz]."""
+
+
+def simulated(folder, seed):
+    """The experiment of `piezo simulate`, and the hidden parameters of its stage."""
+    command = ["simulate", "--protocol", "rich", "--hidden", str(seed)]
+    main([*command, "-o", str(folder / "rich"), "--truth", str(folder / "truth.json")])
+    return read(folder / "rich"), json.loads((folder / "truth.json").read_text())["changes"]
+
+
+def test_the_lag_beside_a_backlash_is_found_and_both_are_as_hidden(tmp_path):
+    """The dynamics contain a part of the pole, and the backlash took the rest: it was 14 % too large."""
+    experiment, truth = simulated(tmp_path, 1)
+    found = diagnose(experiment)
+    assert found.names == ("backlash", "amplifier_bandwidth")
+    low, high = found.fit.interval("backlash.b")
+    assert low < truth["hysteresis.backlash"] < high
+    (pole,) = (n for n in found.fit.names if n.endswith(".tau"))
+    low, high = found.fit.interval(pole)
+    assert low < 1.0 / (2.0 * np.pi * CORNER) < high
+    assert found.gap.after < 1.1 * found.gap.floor
+
+
+def test_a_drift_is_named_beside_dynamics_that_could_imitate_it(tmp_path):
+    experiment, truth = simulated(tmp_path, 11)
+    found = diagnose(experiment)
+    assert found.names == ("gain_drift",)
+    for name, hidden in (("g", truth["environment.gain_per_kelvin"]), ("tau", truth["environment.temperature_time"])):
+        low, high = found.fit.interval(f"gain_drift.{name}")
+        assert low < hidden < high
