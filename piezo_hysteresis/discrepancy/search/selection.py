@@ -19,7 +19,7 @@ Forward selection: Bacher and Madsen 2011. Why a discrepancy needs a structure: 
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 
 from ...effects import CATALOGUE, Effect
@@ -39,7 +39,7 @@ from .candidate_refits import (
     refits_of_twins,
     simplest,
 )
-from .candidates import BY_COST, FittedCandidate, screen
+from .candidates import BY_COST, Candidate, FittedCandidate, screen
 from .selection_result import Rejection, Selection, Step
 from .training_data import TrainingData
 
@@ -100,14 +100,17 @@ def _turn(
     twins = {e.name: t.name for e in effects for t in model.effects if e.is_twin_of(t)}
     absent = [e for e in effects if e.public_name() not in present and e.name not in twins]
     screened = screen(model, training_data, absent)
-    refits = _best_of_each(refit_candidates(model, screened[:REFITS], before, progress))
-    if not refits:
-        return None
-    refits = _best_of_each([*refits, *refits_of_twins(screened, refits[0], before)])
-    best, rejection = _judged(refits, before)
-    if rejection is not None and (late := refits_behind_new_dynamics(model, screened, before)):
+    refits = _best_of_each(refit_candidates(model, _worth_a_refit(screened, before), before, progress))
+    best: FittedCandidate | None = None
+    rejection: Rejection | None = None
+    if refits:
+        refits = _best_of_each([*refits, *refits_of_twins(screened, refits[0], before)])
+        best, rejection = _judged(refits, before)
+    if (best is None or rejection is not None) and (late := refits_behind_new_dynamics(model, screened, before)):
         refits = _best_of_each([*refits, *late])
         best, rejection = _judged(refits, before)
+    if best is None:
+        return None
     rejection = rejection or _untried_twin(type(best.effect), effects)
     accepted, rivals = rejection is None, list[FittedCandidate]()
     rejected = [Rejection(name, f"on slow drive it equals {t}, which is in the model") for name, t in twins.items()]
@@ -127,6 +130,12 @@ def _turn(
         most = max(0.0, before.cost - other.score.cost)
         rejected.append(Rejection(other.name, f"in cross-validation it lowers mean ln R² by at most {most:.2f}"))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected), (*refits, *others))
+
+
+def _worth_a_refit(screened: Sequence[Candidate], before: Score) -> Sequence[Candidate]:
+    """The best candidates; at the floor, what remains is small, and only those whose predicted gain is sufficient."""
+    best = screened[:REFITS]
+    return best if before.excess > ADEQUATE else [c for c in best if before.cost - c.score.cost >= LEAST_GAIN]
 
 
 def _best_of_each(refits: list[FittedCandidate]) -> list[FittedCandidate]:
