@@ -23,6 +23,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+DAY_TO_DAY = {"gain": 0.0075, "loop": 0.04}
+"""Standard deviation of the relative changes of gain and loop height from one day to another."""
+PENALTY = 0.5
+"""Added to V for a gain or loop height that has changed by one such standard deviation."""
+FARTHEST = 2.0
+"""Largest change from day to day, in these standard deviations. A gain or loop height that differs by more has changed
+itself; beside another change it then costs as much as at this limit, however large it is."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Account:

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -32,6 +33,7 @@ from ..effects import (
     ThermalDrift,
 )
 from ..effects.sensor.second_order_low_pass import BUTTERWORTH
+from ..model.model import Model
 
 BESSEL = 0.75**0.5
 """Damping ratio of a Bessel filter, whose delay is flat; a moving average of the same delay begins like it."""
@@ -78,7 +80,7 @@ class ChangeKind:
     @property
     def is_filter(self) -> bool:
         """Whether the size is the time constant of a filter."""
-        return self.name in (SensorBandwidth.name, SecondOrderLowPass.name, AmplifierBandwidth.name)
+        return self.parameter == "tau" and self.name != ExtraDelay.name
 
 
 KINDS: dict[str, ChangeKind] = {
@@ -104,6 +106,14 @@ KINDS: dict[str, ChangeKind] = {
             ("low_pass_poles", "low-pass of second order (two equal poles)", 1.0),
         )
     },
+    "other_filter": ChangeKind(
+        SecondOrderLowPass.name,
+        "lag",
+        "lag",
+        "s",
+        (),
+        "a filter of another form (of higher order, a moving average, or with a delay) follows it",
+    ),
     Creep.name: ChangeKind(Creep.name, Creep.family, "relative", "1", (Creep.name,), "its creep has changed by {size}"),
     "resonance": ChangeKind(
         ExtraResonance.name, "dynamics", "f0", "Hz", ("resonance",), "its resonance has moved by {size}"
@@ -152,6 +162,8 @@ class ParameterChange:
     also : mapping of str to (float, float, float)
         Those of them that have changed by more than from day to day: change of the mean slope or of the loop height,
         and its 95 % interval.
+    added : callable, optional
+        (model, size) → the model with the change, where its form was fitted.
     """
 
     key: str
@@ -162,6 +174,7 @@ class ParameterChange:
     after: float
     session: dict[str, float]
     also: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    added: Callable[[Model, float], Model] | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -180,9 +193,9 @@ class ParameterChange:
 
     @property
     def member_certain(self) -> bool:
-        """False if another member of the family explains as much, or if a large residual remains."""
+        """False for another form, if another member of the family explains as much, or if a large residual remains."""
         families = {KINDS[r].family for r in self.rivals if KINDS[r].name in self.others}
-        return self.after < LEAVES and self.kind.family not in families
+        return self.added is None and self.after < LEAVES and self.kind.family not in families
 
     @property
     def lag(self) -> tuple[float, float, float]:

@@ -29,19 +29,12 @@ from ..identification.structure.pieces import WEIGHTS, pieces_of
 from ..identification.structure.step_weights import shares_of_steps
 from ..model.model import Model
 from ..record import Record
-from .account import Account
+from .account import DAY_TO_DAY, FARTHEST, PENALTY, Account
 from .change_kinds import KINDS
-from .signatures import SHAPES, ChangeablePrediction, predictions
+from .signatures import SHAPES, ChangeablePrediction, Shaped, predictions
 
 Array = NDArray[np.float64]
 
-DAY_TO_DAY = {"gain": 0.0075, "loop": 0.04}
-"""Standard deviation of the relative changes of gain and loop height from one day to another."""
-PENALTY = 0.5
-"""Added to V for a gain or loop height that has changed by one such standard deviation."""
-FARTHEST = 2.0
-"""Largest change from day to day, in these standard deviations. A gain or loop height that differs by more has changed
-itself; beside another change it then costs as much as at this limit, however large it is."""
 SHORTEST, LONGEST = 0.02, 100.0
 """Range of delays and time constants in the search [samples]."""
 SHOWN = 0.3
@@ -72,6 +65,7 @@ class ChangeSearch:
         self.predicted, self.loop_share = predictions(model, records)
         self.used = list(used)
         self._held: tuple[str, ...] = ()
+        self._shapes = SHAPES
         self.sides = ["gain"] + (["loop"] if "loop" in self.predicted[0].rows else [])
         pieces = [p for p in pieces_of(records, self.used) if p.origin in self.used]
         self._kinds = [p.kind for p in pieces]
@@ -95,15 +89,21 @@ class ChangeSearch:
         found.weights, found._floors, found._held = self.weights / factor, self._floors * factor, tuple(held)
         return found
 
+    def with_shape(self, key: str, shape: Shaped) -> ChangeSearch:
+        """The same search with one more change that acts on the whole prediction."""
+        found = copy(self)
+        found._shapes = {**self._shapes, key: shape}
+        return found
+
     def _columns(self, key: str, size: float, names: Sequence[str]) -> tuple[Array, Array]:
         """Changed prediction of all used samples (n,), and the columns `names` with the same change (q, n)."""
-        shape, used = SHAPES.get(key), [self.predicted[i] for i in self.used]
+        shape, used = self._shapes.get(key), [self.predicted[i] for i in self.used]
 
         def changed(p: ChangeablePrediction, signal: Array, before: float) -> Array:
             return signal if shape is None else shape(p, signal, before, size)
 
         y = np.concatenate([changed(p, p.y, p.before) for p in used])
-        rows = [np.concatenate([changed(p, p.rows[n], p.before if n == "gain" else 0.0) for p in used]) for n in names]
+        rows = [y if n == "gain" else np.concatenate([changed(p, p.rows[n], 0.0) for p in used]) for n in names]
         return y, np.array(rows)
 
     def _weighted(self, signals: Array, root: Array) -> Array:
@@ -134,7 +134,13 @@ class ChangeSearch:
     def account(
         self, key: str, size: float = 0.0, free: Sequence[str] = (), mask: NDArray[np.bool_] | None = None
     ) -> Account:
-        """Least squares for the linear parameters and for a zero in every record, with a change of given size.
+        """Least squares for the linear parameters and for a zero in every record, with a change of given size."""
+        return self.fitted(key, size, free, mask)[0]
+
+    def fitted(
+        self, key: str, size: float = 0.0, free: Sequence[str] = (), mask: NDArray[np.bool_] | None = None
+    ) -> tuple[Account, Array]:
+        """The same account, and the weighted residual that it leaves (n,).
 
         Gain and loop height have a penalty that corresponds to their change from day to day, unless they are in `free`.
         Beside a change it is at most that of the largest such difference, because they may have changed too.
@@ -142,10 +148,10 @@ class ChangeSearch:
         names = (*self.sides, *(n for n in (KINDS[key].rows if key in KINDS else ())))
         y, columns = self._columns(key, size, names)
         root = self.weights if mask is None else np.where(mask, self.weights, 0.0)
-        target, matrix = self._weighted(self.measured - y, root), self._weighted(columns, root)
-        scale = np.linalg.norm(matrix, axis=1)
+        target, influence = self._weighted(self.measured - y, root), self._weighted(columns, root)
+        scale = np.linalg.norm(influence, axis=1)
         scale[scale <= CONSTANT * np.linalg.norm(root * columns, axis=1)] = np.inf
-        matrix = matrix / scale[:, None]
+        matrix = influence / scale[:, None]
         gram, gradient, power = matrix @ matrix.T, matrix @ target, float(target @ target)
 
         def solved(penalties: Sequence[Array]) -> tuple[float, float, Array]:
@@ -158,7 +164,7 @@ class ChangeSearch:
 
         held = [self._penalties(key, name, names) for name in self.sides if name not in free]
         cost, left, theta = min(map(solved, itertools.product(*held)), key=lambda found: found[0])
-        return Account(key, cost, left, size, theta, names, scale)
+        return Account(key, cost, left, size, theta, names, scale), target - theta @ influence
 
     def _penalties(self, key: str, name: str, names: Sequence[str]) -> list[Array]:
         """Directions of the parameters `names` along which gain or loop height may have a penalty; zeros for none.
@@ -204,11 +210,7 @@ class ChangeSearch:
         return float(np.mean(power) / np.mean([floors[i] ** 2 for i in self.used]))
 
     def shaped(
-        self,
-        key: str,
-        mask: NDArray[np.bool_] | None = None,
-        near: float | None = None,
-        free: Sequence[str] = (),
+        self, key: str, mask: NDArray[np.bool_] | None = None, near: float | None = None, free: Sequence[str] = ()
     ) -> Account:
         """The best size of a delay or of a filter."""
         period = min(p.record.sample_period for p in self.predicted)
@@ -230,7 +232,7 @@ class ChangeSearch:
 
     def best(self, key: str, mask: NDArray[np.bool_] | None = None, near: float | None = None) -> Account:
         """The account of a change with its best size, in the unit of its kind."""
-        if key in SHAPES:
+        if key in self._shapes:
             return self.shaped(key, mask, near)
         found = self.account(key, free=(key,), mask=mask)
         rows = KINDS[key].rows or (key,)
@@ -244,7 +246,7 @@ class ChangeSearch:
         """
         numbers = np.unique(self.labels[self.weights > 0.0])
         groups = [g for g in np.array_split(numbers, min(6, numbers.size)) if g.size]
-        near = best.size if best.key in SHAPES else None
+        near = best.size if best.key in self._shapes else None
         whole = self.account("none").cost - best.cost
         half = np.zeros(1 + len(self.sides))
         for labels, parts in ((self.labels, groups), (self.origins, [[o] for o in np.unique(self.origins)])):

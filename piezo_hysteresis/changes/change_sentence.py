@@ -27,6 +27,7 @@ UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 """Units of time."""
 
 
+
 def sentence_of(change: ParameterChange) -> str:
     """The change in a few sentences, with its size and interval."""
     kind = change.kind
@@ -36,12 +37,13 @@ def sentence_of(change: ParameterChange) -> str:
         size += f", cut-off frequency {0.5 / np.pi / change.size:.4g} Hz"
     words = [kind.words.format(how="later" if change.size > 0.0 else "earlier", size=size)]
     words += [KINDS[key].words.format(size=_with_interval(also, KINDS[key].unit)) for key, also in change.also.items()]
-    late = f" It delays slow signals by {_with_interval(change.lag, 's')}." if kind.damping else ""
+    late = f" It delays slow signals by {_with_interval(change.lag, 's')}." if "lag" in change.parameters else ""
     what = ", ".join(f"{k.name} ({k.family})" for k in (kind, *(KINDS[key] for key in change.also)))
     names = change.others
     alike = f" It cannot be distinguished from {' and '.join(names)} in these records." if names else ""
     left = "" if change.after < LEAVES else " The remaining error is above the known error, so the form is not certain."
-    return f"The stage is the same, but {' and '.join(words)}: {what}.{late}{alike}{left}"
+    said = f"{late}{alike}{left}"
+    return f"The stage is the same, but {' and '.join(words)}: {what}.{said}"
 
 
 def _with_interval(numbers: Sequence[float], unit: str) -> str:

@@ -35,7 +35,9 @@ def changed_model(model: Model, change: ParameterChange, records: Sequence[Recor
     values = model.values()
     gain, loop = change.session.get("gain", 0.0), change.session.get("loop", 0.0)
     numbers = {n: v * (1.0 + loop) for n, v in loop_heights(model).items()} if loop else {}
-    if change.kind.family == "lag":
+    if change.added is not None:
+        model = change.added(model, change.size)
+    elif change.kind.family == "lag":
         model = shaped_model(model, change.key, change.size)
     elif change.kind.name == ExtraResonance.name:
         name = f"{ExtraResonance.name}.f0"

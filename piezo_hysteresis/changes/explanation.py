@@ -44,11 +44,17 @@ def half_interval(account: Account, name: str, jackknife: float) -> float:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Explanation:
-    """An account, and the search with the model around which it is linearised."""
+    """An account, and the search with the model around which it is linearised.
+
+    Where a form was fitted beside the size, `per_error` is by how much the size may differ per RMS error, and
+    `added` is (model, size) → the model with this form.
+    """
 
     search: ChangeSearch
     account: Account
     moved: float = 0.0
+    per_error: float = 0.0
+    added: Callable[[Model, float], Model] | None = None
 
     @property
     def size(self) -> float:
@@ -58,7 +64,8 @@ class Explanation:
     def alike(self, before: float) -> float:
         """Half interval of the size due to the remaining error; `before` is V without the change."""
         left = max(1.0, self.account.cost)
-        return UNCERTAIN * abs(self.size) * float(np.sqrt(left / max(before - self.account.cost, 1e-12)))
+        alone = abs(self.size) / float(np.sqrt(max(before - self.account.cost, 1e-12)))
+        return UNCERTAIN * float(np.sqrt(left)) * max(alone, self.per_error)
 
 
 def moved_resonance(search: ChangeSearch, model: Model) -> Explanation:

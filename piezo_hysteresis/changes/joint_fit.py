@@ -26,8 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .account import Account
-from .change_search import AROUND, DAY_TO_DAY, FARTHEST, ChangeSearch
+from .account import DAY_TO_DAY, FARTHEST, Account
+from .change_search import AROUND, ChangeSearch
 from .explanation import UNCERTAIN
 from .parameter_changes import RIVAL, SEEN, is_sure
 

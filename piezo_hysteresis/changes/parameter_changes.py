@@ -31,11 +31,12 @@ from ..effects import Softening
 from ..identification.records.noise_floor import ADEQUATE
 from ..model.model import Model
 from ..record import Record
-from .account import Account
+from .account import DAY_TO_DAY, FARTHEST, Account
 from .change_kinds import KINDS, LEAVES, ParameterChange
-from .change_search import DAY_TO_DAY, FARTHEST, ChangeSearch
+from .change_search import ChangeSearch
 from .explanation import Explanation, half_interval, low_pass_before, moved_resonance
-from .signatures import AVERAGE, SECOND_ORDER, SHAPES, shaped_model
+from .lag.other_filter import other_filters
+from .signatures import SECOND_ORDER, SHAPES, shaped_model
 
 Array = NDArray[np.float64]
 
@@ -56,6 +57,8 @@ the ratio, because what remains is then an error of the form."""
 FORMS = 6.0
 """Largest ratio of V for which another change counts as explaining as much, and the lag of another form counts in the
 interval."""
+OTHER_FORM = 1.5
+"""Ratio of V from which a filter of another form is named in place of a form with a name."""
 SURE = 2.5
 """Smallest significant change, in standard errors."""
 
@@ -91,15 +94,39 @@ def find_change(
     day = search.account("none")
     if search.of_equal_records(day, floors) + day.cost - day.left <= ADEQUATE:
         return None
+    found = _explanations(search, model, progress)
+    others = _other_filters(search, found[0])
+    if others and OTHER_FORM * others[0].account.cost < found[0].account.cost:
+        found.insert(0, others.pop(0))
+    best, search = found[0].account, found[0].search
+    share = NEARLY_ALL_OF_A_SHAPE if best.key in SHAPES_OF_LOOPS else NEARLY_ALL
+    leaves = best.left < max(LEAVES, share * day.cost)
+    if not (leaves and best.cost < EXPLAINS * day.cost and day.cost - best.cost > SEEN**2):
+        return None
+    jackknife, *beside = search.halves(best).tolist()
+    spread = _spread_of_forms(found[0], found[1:], others[:1])
+    half = float(np.linalg.norm((jackknife, found[0].alike(day.cost), spread)))
+    size = found[0].size
+    if not is_sure(size, half) or (best.key in DAY_TO_DAY and abs(size) < FARTHEST * DAY_TO_DAY[best.key]):
+        return None
+    same = float(np.clip(best.left, RIVAL, FORMS))
+    near = [e.account.key for e in found[1:] if e.account.cost < same * max(1.0, best.cost)]
+    also = _moved_too(search, best, dict(zip(search.sides, beside, strict=True)))
+    rivals = tuple(k for k in dict.fromkeys(near) if k != best.key and k not in also)
+    low, middle, high = (search.stated(best.key, number) for number in (size - half, size, size + half))
+    return ParameterChange(
+        best.key, middle, (low, high), rivals, day.cost, best.left, search.session(best), also, found[0].added
+    )
+
+
+def _explanations(search: ChangeSearch, model: Model, progress: Callable[[float], None]) -> list[Explanation]:
+    """What each change with a name explains, the best first."""
     keys = [k for k, kind in KINDS.items() if k in SHAPES or (kind.rows and kind.rows[0] in search.predicted[0].rows)]
-    first = [k for k in (*search.sides, *keys) if k not in (*SECOND_ORDER, "low_pass_before")]
-    accounts = []
-    for done, key in enumerate(first):
+    first = [k for k in (*search.sides, *keys) if k != "low_pass_before"]
+    found = []
+    for done, key in enumerate(first, 1):
+        found.append(Explanation(search, search.best(key)))
         progress(done / (len(first) + 1))
-        accounts.append(search.best(key))
-    progress(len(first) / (len(first) + 1))
-    accounts += _filters_of_second_order(search)
-    found = [Explanation(search, a) for a in accounts]
     if "resonance" in keys and min(e.account.cost for e in found) > LEAVES:
         found.append(moved_resonance(search, model))
     least = min(e.account.cost for e in found)
@@ -113,22 +140,7 @@ def find_change(
     sides = [e for e in found if e.account.key in DAY_TO_DAY and e.account.cost < most]
     if found[0] in sides:  # of gain and loop height, the one that is farther from what differs from day to day
         found.sort(key=lambda e: e is not max(sides, key=lambda s: _in_deviations(s.search, s.account, s.account.key)))
-    best, search = found[0].account, found[0].search
-    share = NEARLY_ALL_OF_A_SHAPE if best.key in SHAPES_OF_LOOPS else NEARLY_ALL
-    leaves = best.left < max(LEAVES, share * day.cost)
-    if not (leaves and best.cost < EXPLAINS * day.cost and day.cost - best.cost > SEEN**2):
-        return None
-    jackknife, *beside = search.halves(best).tolist()
-    half = float(np.hypot(np.hypot(jackknife, found[0].alike(day.cost)), _spread_of_forms(found)))
-    size = found[0].size
-    if not is_sure(size, half) or (best.key in DAY_TO_DAY and abs(size) < FARTHEST * DAY_TO_DAY[best.key]):
-        return None
-    same = float(np.clip(best.left, RIVAL, FORMS))
-    near = [e.account.key for e in found[1:] if e.account.cost < same * max(1.0, best.cost)]
-    also = _moved_too(search, best, dict(zip(search.sides, beside, strict=True)))
-    rivals = tuple(k for k in dict.fromkeys(near) if k != best.key and k not in also)
-    low, middle, high = (search.stated(best.key, number) for number in (size - half, size, size + half))
-    return ParameterChange(best.key, middle, (low, high), rivals, day.cost, best.left, search.session(best), also)
+    return found
 
 
 def _may_be(found: Explanation, least: float) -> bool:
@@ -168,13 +180,6 @@ def error_ratio(model: Model, records: Sequence[Record], used: Sequence[int], fl
     return float(np.sqrt(search.of_equal_records(search.account("none"), floors)))
 
 
-def _filters_of_second_order(search: ChangeSearch) -> list[Account]:
-    """The best filter of every damping; slow signals are about equally late behind all of them."""
-    (first, zeta), *others = SECOND_ORDER.items()
-    best = search.best(first)
-    return [best, *(search.best(key, near=best.size * zeta / other) for key, other in others)]
-
-
 def _simulated(found: Explanation, model: Model) -> Explanation:
     """A delay or a filter, with the residual that remains when the model simulates it.
 
@@ -190,20 +195,25 @@ def _simulated(found: Explanation, model: Model) -> Explanation:
     return replace(found, account=replace(found.account, cost=least.cost, left=least.left))
 
 
-def _spread_of_forms(found: Sequence[Explanation]) -> float:
-    """Largest difference to the lag of another form, in the unit of the first explanation.
+def _other_filters(search: ChangeSearch, best: Explanation) -> list[Explanation]:
+    """Filters of other forms, best first, if a lag leaves an error that they may explain."""
+    lag = KINDS[best.account.key].lag * best.size
+    return other_filters(search, lag) if lag > 0.0 and best.account.cost > RIVAL else []
 
-    Samples hardly show which form a lag of about a sample has.
+
+def _spread_of_forms(best: Explanation, alike: Sequence[Explanation], nearest: Sequence[Explanation]) -> float:
+    """Largest difference to the lag of another form, in the unit of the best explanation.
+
+    Samples hardly show which form a lag of about a sample has. The `nearest` other filter counts whatever error it
+    leaves: what one pole more or less changes is what the records do not show.
     """
-    best, unit = found[0], KINDS[found[0].account.key].lag
+    unit = KINDS[best.account.key].lag
     if not unit:
         return 0.0
     most = FORMS * max(1.0, best.account.cost)
-    forms = [(e.account.cost, e.size * KINDS[e.account.key].lag) for e in found[1:] if KINDS[e.account.key].lag]
-    if best.account.key in SECOND_ORDER:
-        mean = best.search.shaped(AVERAGE, near=unit * best.size)
-        forms.append((mean.cost, mean.size))
-    return max((abs(lag / unit - best.size) for cost, lag in forms if cost < most), default=0.0)
+    forms = [*nearest, *(e for e in alike if e.account.cost < most)]
+    lags = [e.size * KINDS[e.account.key].lag for e in forms if KINDS[e.account.key].lag]
+    return max((abs(lag / unit - best.size) for lag in lags), default=0.0)
 
 
 def is_sure(size: float, half: float) -> bool:

@@ -46,12 +46,10 @@ from ..model.model import Model
 from ..online.change.score import loop_heights
 from ..record import Record
 from .change_kinds import KINDS
-from .filtered_signal import averaged, derivatives, filtered
+from .lag.filtered_signal import derivatives, filtered, shifted
 
 Array = NDArray[np.float64]
 
-AVERAGE = "moving_average"
-"""A mean of the last samples; not a change that is named, because it resembles a Bessel filter of the same delay."""
 DRIFT_TIME = 3.0
 """Time constant of a drift over the length of the longest record: the drift within a record is almost linear."""
 
@@ -181,11 +179,7 @@ def settled(model: Model, voltage: float) -> float:
 
 def delayed(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
     """A signal of the record, delayed by `tau` [s], which may be negative. It was `before` until the first sample."""
-    at = np.arange(signal.size) - tau / prediction.record.sample_period
-    end = np.clip(np.ceil(at).astype(int), 0, signal.size - 1)
-    part = np.clip(at - (end - 1), 0.0, 1.0)
-    value, slope, second, third = prediction.between(signal, before)[:, end]
-    return np.asarray(value + part * (slope + part * (second / 2.0 + part * third / 6.0)))
+    return shifted(prediction.between(signal, before), tau / prediction.record.sample_period)
 
 
 def filtered_by(
@@ -195,12 +189,6 @@ def filtered_by(
     if tau <= 0.0:
         return signal
     return filtered(prediction.between(signal, before), before, prediction.record.sample_period, tau, zeta)
-
-
-def averaged_by(prediction: ChangeablePrediction, signal: Array, before: float, tau: float) -> Array:
-    """The mean of a signal of the record over the last 2 `tau` [s], which delays it by `tau`."""
-    samples = 2.0 * tau / prediction.record.sample_period
-    return averaged(prediction.between(signal, before), before, samples) if samples > 0.0 else signal
 
 
 Shaped = Callable[[ChangeablePrediction, Array, float, float], Array]
@@ -213,7 +201,6 @@ SHAPES: dict[str, Shaped] = {
     "delay": delayed,
     "low_pass": filtered_by,
     **{key: partial(filtered_by, zeta=zeta) for key, zeta in SECOND_ORDER.items()},
-    AVERAGE: averaged_by,
 }
 """Changes that act on the whole prediction, by name."""
 
@@ -227,12 +214,16 @@ def shaped_model(model: Model, key: str, size: float) -> Model:
         held = size - (new.lag(model.sample_period)[0] - old.lag(model.sample_period)[0])
         return shaped_model(model.with_effect(new), "delay", held)
     if KINDS[key].is_filter:
-        name = KINDS[key].name
-        tau = size + (model[name]["tau"] if name in model else 0.0)
-        zeta = SECOND_ORDER.get(key)
-        return model.with_effect(SensorBandwidth(tau=tau) if zeta is None else SecondOrderLowPass(tau=tau, zeta=zeta))
+        return with_low_pass(model, size, SECOND_ORDER.get(key))
     if Arx.name in model and ExtraDelay.name not in model:
         name = f"{Arx.name}.delay"
         return model.with_values({name: max(0.0, model.values()[name] + size / model.sample_period)})
     present = model[ExtraDelay.name]["tau"] if ExtraDelay.name in model else 0.0
     return model.with_effect(ExtraDelay(tau=max(0.0, present + size)))
+
+
+def with_low_pass(model: Model, tau: float, zeta: float | None = None) -> Model:
+    """The model with a low-pass of the sensor slower by `tau` [s], of second order with a damping ratio."""
+    name = SensorBandwidth.name if zeta is None else SecondOrderLowPass.name
+    tau += model[name]["tau"] if name in model else 0.0
+    return model.with_effect(SensorBandwidth(tau=tau) if zeta is None else SecondOrderLowPass(tau=tau, zeta=zeta))

@@ -82,21 +82,16 @@ def filtered(between: Array, before: float, sample_period: float, tau: float, ze
     return np.asarray(before + moved)
 
 
-def averaged(between: Array, before: float, samples: float) -> Array:
-    """Mean of a signal over the last `samples` samples, shape (n,); arguments as for `filtered`.
+def shifted(between: Array, samples: float) -> Array:
+    """A signal that is later by a number of samples, which may be negative, shape (n,); `between` as for `filtered`.
 
     Examples
     --------
-    >>> float(np.round(averaged(derivatives(np.arange(10.0), -1.0), -1.0, 3.0)[-1], 9))
-    7.5
+    >>> shifted(derivatives(np.arange(10.0), -1.0), 2.5)[5:].tolist()
+    [2.5, 3.5, 4.5, 5.5, 6.5]
     """
-    size = between.shape[1]
-    powers = np.arange(1.0, 5.0)
-    shares = between / np.array([1.0, 2.0, 6.0, 24.0])[:, None]
-    whole = np.concatenate(([0.0], np.cumsum(shares.sum(axis=0))))  # integral up to the beginning of every interval
-    at = np.arange(size) - samples
-    end = np.clip(np.ceil(at).astype(int), 0, size - 1)
+    at = np.arange(between.shape[1]) - samples
+    end = np.clip(np.ceil(at).astype(int), 0, at.size - 1)
     part = np.clip(at - (end - 1), 0.0, 1.0)
-    begin = whole[end] + (shares[:, end] * part ** powers[:, None]).sum(axis=0)
-    begin += before * np.minimum(at + 1.0, 0.0)
-    return np.asarray((whole[1:] - begin) / samples)
+    value, slope, second, third = between[:, end]
+    return np.asarray(value + part * (slope + part * (second / 2.0 + part * third / 6.0)))
