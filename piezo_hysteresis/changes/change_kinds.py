@@ -162,6 +162,8 @@ class ParameterChange:
     also : mapping of str to (float, float, float)
         Those of them that have changed by more than from day to day: change of the mean slope or of the loop height,
         and its 95 % interval.
+    unseen : float
+        Half interval of the lag because samples do not show when between them the stage moves [s].
     added : callable, optional
         (model, size) → the model with the change, where its form was fitted.
     """
@@ -174,6 +176,7 @@ class ParameterChange:
     after: float
     session: dict[str, float]
     also: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    unseen: float = 0.0
     added: Callable[[Model, float], Model] | None = None
 
     @property

@@ -26,6 +26,11 @@ from .change_kinds import KINDS, LEAVES, ParameterChange
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 """Units of time."""
 
+UNSEEN = (
+    " The stage moves within one sample, at a time that the samples do not show: the interval includes this, but not a "
+    "mode above half the sampling rate that has moved."
+)
+"""Added to a lag that the samples show only in part."""
 
 
 def sentence_of(change: ParameterChange) -> str:
@@ -42,7 +47,7 @@ def sentence_of(change: ParameterChange) -> str:
     names = change.others
     alike = f" It cannot be distinguished from {' and '.join(names)} in these records." if names else ""
     left = "" if change.after < LEAVES else " The remaining error is above the known error, so the form is not certain."
-    said = f"{late}{alike}{left}"
+    said = f"{late}{alike}{left}{UNSEEN if change.unseen else ''}"
     return f"The stage is the same, but {' and '.join(words)}: {what}.{said}"
 
 

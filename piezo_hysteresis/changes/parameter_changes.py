@@ -35,6 +35,7 @@ from .account import DAY_TO_DAY, FARTHEST, Account
 from .change_kinds import KINDS, LEAVES, ParameterChange
 from .change_search import ChangeSearch
 from .explanation import Explanation, half_interval, low_pass_before, moved_resonance
+from .lag.motion_between_samples import unseen_lag
 from .lag.other_filter import other_filters
 from .signatures import SECOND_ORDER, SHAPES, shaped_model
 
@@ -104,8 +105,9 @@ def find_change(
     if not (leaves and best.cost < EXPLAINS * day.cost and day.cost - best.cost > SEEN**2):
         return None
     jackknife, *beside = search.halves(best).tolist()
+    unseen = unseen_lag(model, is_explained=best.left < LEAVES) if KINDS[best.key].lag else 0.0
     spread = _spread_of_forms(found[0], found[1:], others[:1])
-    half = float(np.linalg.norm((jackknife, found[0].alike(day.cost), spread)))
+    half = float(np.linalg.norm((jackknife, found[0].alike(day.cost), spread, unseen / (KINDS[best.key].lag or 1.0))))
     size = found[0].size
     if not is_sure(size, half) or (best.key in DAY_TO_DAY and abs(size) < FARTHEST * DAY_TO_DAY[best.key]):
         return None
@@ -115,7 +117,7 @@ def find_change(
     rivals = tuple(k for k in dict.fromkeys(near) if k != best.key and k not in also)
     low, middle, high = (search.stated(best.key, number) for number in (size - half, size, size + half))
     return ParameterChange(
-        best.key, middle, (low, high), rivals, day.cost, best.left, search.session(best), also, found[0].added
+        best.key, middle, (low, high), rivals, day.cost, best.left, search.session(best), also, unseen, found[0].added
     )
 
 
