@@ -60,6 +60,8 @@ FORMS = 6.0
 interval."""
 OTHER_FORM = 1.5
 """Ratio of V from which a filter of another form is named in place of a form with a name."""
+FORM_SHOWN = 2.0
+"""Smallest lag of which samples show the form [samples]."""
 SURE = 2.5
 """Smallest significant change, in standard errors."""
 
@@ -97,7 +99,8 @@ def find_change(
         return None
     found = _explanations(search, model, progress)
     others = _other_filters(search, found[0])
-    if others and OTHER_FORM * others[0].account.cost < found[0].account.cost:
+    shown = [e for e in others[:1] if e.size > FORM_SHOWN * model.sample_period]
+    if shown and OTHER_FORM * shown[0].account.cost < found[0].account.cost:
         found.insert(0, others.pop(0))
     best, search = found[0].account, found[0].search
     share = NEARLY_ALL_OF_A_SHAPE if best.key in SHAPES_OF_LOOPS else NEARLY_ALL
@@ -105,7 +108,7 @@ def find_change(
     if not (leaves and best.cost < EXPLAINS * day.cost and day.cost - best.cost > SEEN**2):
         return None
     jackknife, *beside = search.halves(best).tolist()
-    unseen = unseen_lag(model, is_explained=best.left < LEAVES) if KINDS[best.key].lag else 0.0
+    unseen = unseen_lag(model) if KINDS[best.key].lag else 0.0
     spread = _spread_of_forms(found[0], found[1:], others[:1])
     half = float(np.linalg.norm((jackknife, found[0].alike(day.cost), spread, unseen / (KINDS[best.key].lag or 1.0))))
     size = found[0].size

@@ -27,14 +27,13 @@ SETTLES = 256
 """Number of samples of the response to a step."""
 
 
-def unseen_lag(model: Model, *, is_explained: bool) -> float:
+def unseen_lag(model: Model) -> float:
     """Half the interval of a lag that a change of the time of motion between two samples allows [s].
 
     The converter holds every sample, so what a model passes of a step within one sample, a stage passes at any time
-    in it. A mode that was found in the records is known between samples, too, and nothing is left open; unless the
-    records are not explained, because above half the sampling rate there is another one that rings alike in samples.
+    in it. A mode that was found in the records is known between samples, too, and nothing is left open.
     """
-    if is_explained and ExtraResonance.name in model and not mode_is_inferred(model):
+    if ExtraResonance.name in model and not mode_is_inferred(model):
         return 0.0
     response = np.ones(SETTLES)
     for block in model.at(model.sample_period).blocks:
