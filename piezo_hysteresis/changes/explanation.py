@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -94,10 +94,14 @@ def low_pass_before(search: ChangeSearch, model: Model, lag: float) -> Explanati
 
 
 def _settled(about: Callable[[float], Explanation], best: Explanation, limits: tuple[float, float]) -> Explanation:
-    """The change with the least cost from a start. It is linear only near the solution, so the search iterates."""
+    """The change with the least cost from a start. It is linear only near the solution, so the search iterates.
+
+    It explains nothing if the last step leads out of its range, to a time constant or a frequency that does not exist.
+    """
     for _ in range(TURNS):
         again = about(float(np.clip(best.size, *limits)))
         if again.account.cost >= best.account.cost:
             break
         best = again
-    return best
+    exists = limits[0] <= best.size <= limits[1]
+    return best if exists else replace(best, account=replace(best.account, cost=np.inf))
