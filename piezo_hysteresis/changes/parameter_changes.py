@@ -58,8 +58,6 @@ the ratio, because what remains is then an error of the form."""
 FORMS = 6.0
 """Largest ratio of V for which another change counts as explaining as much, and the lag of another form counts in the
 interval."""
-OTHER_FORM = 1.5
-"""Ratio of V from which a filter of another form is named in place of a form with a name."""
 FORM_SHOWN = 2.0
 """Smallest lag of which samples show the form [samples]."""
 SURE = 2.5
@@ -100,7 +98,7 @@ def find_change(
     found = _explanations(search, model, progress)
     others = _other_filters(search, found[0])
     shown = [e for e in others[:1] if e.size > FORM_SHOWN * model.sample_period]
-    if shown and OTHER_FORM * shown[0].account.cost < found[0].account.cost:
+    if shown and RIVAL * shown[0].account.cost < found[0].account.cost:
         found.insert(0, others.pop(0))
     best, search = found[0].account, found[0].search
     share = NEARLY_ALL_OF_A_SHAPE if best.key in SHAPES_OF_LOOPS else NEARLY_ALL
