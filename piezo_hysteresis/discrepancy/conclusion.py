@@ -68,11 +68,9 @@ def concluded(
     def gap_of(before: Model, after: Model, chosen: Sequence[int], *, offset: bool = False) -> Gap:
         unseen = chosen is setup.test_records
         both, least = (before, after), setup.least.tolist()
-        return measure_gap(
-            both, setup.records, chosen, least, setup.span, unseen=unseen, offset=offset, between=between
-        )
+        return measure_gap(both, setup.records, chosen, least, setup.span, unseen=unseen, offset=offset)
 
-    tested, between = setup.test_records or setup.fitted, selection.models_between
+    tested = setup.test_records or setup.fitted
     named = is_explained(selection)
     falls = diverges = False
     if named:
@@ -81,7 +79,7 @@ def concluded(
             gap = gap_of(first.model, final.model, tested)
             falls = gap.falls
     if not falls:
-        final, between = first, ()
+        final = first
         try:
             gap = gap_of(first.model, first.model, tested)
         except DivergenceError:

@@ -103,16 +103,16 @@ class Diagnosis(Pictured):
         if self.selection is None:
             return ()
         rejections: dict[str, Rejection] = {}
-        shares = () if self.gap is None else self.gap.shares
-        for k, step in enumerate(self.selection.steps):
+        closest = [s.best.name for s in self.selection.accepted]
+        for step in self.selection.steps:
             if self.verdict is Verdict.UNKNOWN and step.accepted:
-                name, closed = step.best.name, 100 * self.selection.explained(step.best.score)
-                reason = f"it is the closest effect, but explains only {closed:.0f} % of the gap"
-                if k:
-                    reason = f"with the effects before it, it explains only {closed:.0f} % of the gap"
-                if self.model is not None and name in self.model:
-                    share = f"{100 * shares[k]:.0f} % of the gap"
-                    reason = f"it is in the model but not named: up to it, {share} are explained"
+                name, closed = step.best.name, f"{100 * self.selection.explained(self.selection.score):.0f} % of the gap"
+                reason = f"it is the closest effect, but explains only {closed}"
+                if len(closest) > 1:
+                    reason = f"the closest effects, {' and '.join(closest)}, explain only {closed} together"
+                if self.gap is not None and self.model is not None and name in self.model:
+                    share = f"{100 * self.gap.explained:.0f} % of the gap"
+                    reason = f"it is in the model but not named: the model explains {share}"
                 rejections[name] = Rejection(name, reason)
             for rejection in step.rejected:
                 rejections[rejection.name] = rejection
@@ -126,7 +126,7 @@ class Diagnosis(Pictured):
         if self.verdict is not Verdict.NAMED or self.selection is None or self.fit is None or self.gap is None:
             return []
         rows = []
-        for step, share in zip(self.selection.accepted, self.gap.shares, strict=True):
+        for step in self.selection.accepted:
             effect = self.fit.model[step.best.name]
             rows.append(
                 {
@@ -135,7 +135,7 @@ class Diagnosis(Pictured):
                     "family": effect.family,
                     "predicted_live": effect.is_predicted_live(),
                     "member_certain": step.member_certain,
-                    "explained_fraction": round(share, 4),
+                    "explained_fraction": round(self.gap.explained, 4),
                     "parameters": _parameters(self.fit, effect.name),
                     "confusable_with": list(step.confusable_with),
                     "held_out_gain": round(step.before.cost - step.best.score.cost, 4),
@@ -170,15 +170,13 @@ class Diagnosis(Pictured):
         return f"Diagnosis({self.verdict}: {self.reason})"
 
     def _repr_html_(self) -> str:
-        rows = ((e["name"], f"{100 * e['explained_fraction']:.0f} %", e["family"]) for e in self.answer()["effects"])
-        return html_table(repr(self), ("effect", "explained", "family"), rows)
+        return html_table(repr(self), ("effect", "family"), ((e["name"], e["family"]) for e in self.effects()))
 
     def summary(self) -> str:
         """The answer as text of several lines."""
         lines = [self.reason]
         for row in self.effects():
-            closed = 100 * row["explained_fraction"]
-            lines.append(f"  {row['name']} ({row['family']}): explains {closed:.0f} % of the gap")
+            lines.append(f"  {row['name']} ({row['family']})")
             for name, p in row["parameters"].items():
                 ends = p["interval_95"]
                 known = f"95 %: {ends[0]:.4g} to {ends[1]:.4g}" if ends else "not fitted"
@@ -188,8 +186,9 @@ class Diagnosis(Pictured):
         if self.gap is not None:
             g = self.gap
             seen = "test records" if g.unseen else "training records, because there were too few for test records"
+            share = f" ({100 * g.explained:.0f} % explained)" if self.names else ""
             lines.append(
-                f"  gap {g.before:.3g} % → {g.after:.3g} % of range, noise floor {g.floor:.3g} % (on the {seen})"
+                f"  gap {g.before:.3g} % → {g.after:.3g} % of range{share}, noise floor {g.floor:.3g} % (on the {seen})"
             )
         if self.correction is not None:
             lines.append(f"  {self.correction.sentence()}")

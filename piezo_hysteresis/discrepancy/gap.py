@@ -69,8 +69,6 @@ class Gap:
         each record. It differs from `after` only for effects that are not predicted live.
     free_zeros : bool
         Whether the sensor zero was free in every record.
-    between : tuple of float
-        V of the model up to each named effect but the last.
     """
 
     before: float
@@ -81,7 +79,6 @@ class Gap:
     unseen: bool
     live: float
     free_zeros: bool = False
-    between: tuple[float, ...] = ()
 
     @property
     def falls(self) -> bool:
@@ -96,13 +93,7 @@ class Gap:
     @property
     def explained(self) -> float:
         """Share X of the gap that the extended model explains: 1 − √((V_after − 1)/(V_before − 1)), between 0 and 1."""
-        return self.shares[-1]
-
-    @property
-    def shares(self) -> tuple[float, ...]:
-        """Share X of the gap that the model up to each named effect explains; the last is of the extended model."""
-        before, after = self._squares
-        return tuple(explained(before, square, 1.0) for square in (*self.between, after))
+        return explained(*self._squares, 1.0)
 
     def stated_by(self, model: Model, experiment: Experiment, everywhere: Gap | None = None) -> Model:
         """The extended model with the experiment as its origin, and with its errors.
@@ -149,7 +140,6 @@ def measure_gap(
     *,
     unseen: bool,
     offset: bool = False,
-    between: Sequence[Model] = (),
 ) -> Gap:
     """Compare two models on the records `chosen`.
 
@@ -169,8 +159,6 @@ def measure_gap(
         Whether the chosen records were used neither for fitting nor for choosing.
     offset : bool
         Whether the sensor zero is free in every record. The hum of a model with hum always is.
-    between : sequence of Model
-        The models up to each named effect but the last. One that diverges explains nothing.
 
     Raises
     ------
@@ -181,12 +169,6 @@ def measure_gap(
     def left_by(model: Model, nuisance: Nuisance | None = None) -> Array:
         left = residuals_on(model, records, chosen, nuisance or free_per_record(model, offset=offset))
         return np.array([100.0 * float(np.sqrt(np.mean(e**2))) / stroke for e in left])
-
-    def square(model: Model) -> float:
-        try:
-            return float(np.mean((left_by(model) / least) ** 2))
-        except DivergenceError:
-            return np.inf
 
     least = 100.0 * np.array([floors[i] for i in chosen]) / stroke
     before = left_by(models[0])
@@ -209,5 +191,4 @@ def measure_gap(
         unseen=unseen,
         live=float(np.sqrt(np.mean(np.square(live)))),
         free_zeros=offset,
-        between=tuple(square(model) for model in between),
     )

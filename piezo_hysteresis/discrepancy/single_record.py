@@ -156,8 +156,8 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
 
     progress("gap", 0.9)
     first = model or baseline.model  # the gap of a given model is measured before any refit
-    both, between = (first, final.model), selection.models_between
-    gap = measure_gap(both, records, chosen, least.tolist(), span, unseen=bool(aside), offset=True, between=between)
+    both = first, final.model
+    gap = measure_gap(both, records, chosen, least.tolist(), span, unseen=bool(aside), offset=True)
     shown = {s.best.effect.public_name() for s in selection.accepted}
     missing = missing_excitation(records, used, shown)
     origin = CHOSEN if found else REFITTED if final.fit is not None else KEPT

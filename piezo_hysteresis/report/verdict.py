@@ -145,11 +145,13 @@ def _conclusion(answer: Mapping[str, Any]) -> str:
 
 
 def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
+    effects = answer.get("effects", ())
     found = [sentence(answer["reason"])] if answer.get("reason") else []
-    for effect in answer.get("effects", ()):
-        name = effect["name"].replace("_", " ")
-        if not answer.get("reason"):
-            found.append(f"{name.capitalize()} explains {100 * effect['explained_fraction']:.0f} % of the gap.")
+    if effects and not found:
+        names = " and ".join(effect["name"].replace("_", " ") for effect in effects).capitalize()
+        explain = "explain" if len(effects) > 1 else "explains"
+        found.append(f"{names} {explain} {100 * effects[-1]['explained_fraction']:.0f} % of the gap.")
+    for effect in effects:
         if not effect["member_certain"]:
             twins = ", ".join(t.replace("_", " ") for t in effect["confusable_with"])
             others = f": {twins} would explain the data equally well" if twins else ""

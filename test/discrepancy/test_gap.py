@@ -73,10 +73,10 @@ def test_the_interval_of_few_records_is_that_of_student(records):
     assert measure(records, (MODEL, MODEL), (1,)).interval_95 is None
 
 
-def test_the_share_of_each_effect_is_measured_on_the_records_of_the_gap(records):
-    """One model of 100 nm and one of 40 nm between; the floor is 20 nm, and what is left are 10 nm."""
+def test_the_share_is_measured_on_the_records_of_the_gap(records):
+    """The error of one model is 100 nm and that of the other 40 nm; the floor is 20 nm, and the noise 10 nm."""
     far, near = (MODEL.with_effect(Offset(y0=zero)) for zero in (1e-7, 4e-8))
-    gap = measure_gap((far, MODEL), records, (0,), [2e-8] * 3, STROKE, unseen=True, between=(near,))
     first, second = ((size**2 + 1e-16) / 4e-16 for size in (1e-7, 4e-8))
-    assert gap.shares == (pytest.approx(1.0 - np.sqrt((second - 1.0) / (first - 1.0))), 1.0)
-    assert gap.explained == gap.shares[-1]
+    gap = measure(records, (far, near), (0,))
+    assert gap.explained == pytest.approx(1.0 - np.sqrt((second - 1.0) / (first - 1.0)))
+    assert measure(records, (far, MODEL), (0,)).explained == 1.0

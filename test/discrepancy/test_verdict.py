@@ -14,6 +14,7 @@
 
 """What a name asks for."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -21,17 +22,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.gap import Gap
+from piezo_hysteresis.discrepancy.diagnosis import Diagnosis
+from piezo_hysteresis.discrepancy.gap import Gap, PhaseGap
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
-from piezo_hysteresis.discrepancy.verdict import Conclusion, is_explained, unnamed_conclusion
+from piezo_hysteresis.discrepancy.verdict import Conclusion, is_explained, named_conclusion, unnamed_conclusion
 from piezo_hysteresis.effects import Arx, BoucWen, Creep, MainsHum
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.model.model import Model
-from piezo_hysteresis.record import Record
+from piezo_hysteresis.record import Experiment, Record
+from piezo_hysteresis.report.tables.answer_tables import effect_table
 
 STAGE = Model((BoucWen(), Arx(b=(1.0,))), 1e-4, 10.0, 1e-5)
 RECORD = Record(np.linspace(0.0, 10.0, 100), np.zeros(100), 1e-4)
@@ -67,13 +70,32 @@ def test_nothing_added_explains_nothing():
     assert not is_explained(Selection(STAGE, STAGE, score, (), 1.0))
 
 
+def with_hum(first, share):
+    """The search that found hum beside creep, so that both explain a share of the gap."""
+    (step,) = first.steps
+    after = Score(np.sqrt(1.0 + (1.0 - share) ** 2 * (step.before.ratios**2 - 1.0)), np.zeros(1))
+    model = step.best.fit.model.with_effect(MainsHum())
+    hum = FittedCandidate(MainsHum(), EVIDENCE, after, replace(step.best.fit, model=model))
+    return replace(first, model=model, score=after, steps=(step, Step(step.best.score, hum, True, (), ())))
+
+
+def test_no_effect_of_several_is_said_to_explain_nothing():
+    """Creep alone does not lower the error, and with hum nothing is left: its share was stated as 0 %."""
+    found = with_hum(selection(0.0, 50.0), 1.0)
+    row = PhaseGap("triangle", 0, 0.7, 0.1, 0.1)
+    gap = Gap(0.7, 0.1, 0.1, None, (row,), True, 0.1)
+    fit = found.steps[-1].best.fit
+    said, experiment = named_conclusion(found, gap), Experiment((RECORD,))
+    diagnosis = Diagnosis(*said, fit.model, STAGE, experiment, found, fit, gap=gap)
+    assert [row["explained_fraction"] for row in diagnosis.effects()] == [1.0, 1.0]
+    assert "explain 100 % of the gap" in diagnosis.reason
+    for text in (diagnosis.summary(), repr(effect_table(diagnosis.answer())), diagnosis._repr_html_()):
+        assert "100 %" in text and not re.search(r"\b0 %", text)
+
+
 def test_the_closest_answer_is_all_that_was_added():
     """Of two effects that explain 50 % together, only the first was stated, with its 40 %."""
-    first = selection(0.4, 50.0)
-    after = Score(np.sqrt(1.0 + 0.25 * (first.steps[0].before.ratios ** 2 - 1.0)), np.zeros(1))
-    (step,) = first.steps
-    hum = FittedCandidate(MainsHum(), EVIDENCE, after, step.best.fit)
-    second = replace(first, score=after, steps=(step, Step(step.best.score, hum, True, (), ())))
+    second = with_hum(selection(0.4, 50.0), 0.5)
     gap = Gap(1.0, 1.0, 0.1, None, (), True, 1.0)
     conclusion, reason = unnamed_conclusion(second, True, gap)
     assert conclusion is Conclusion.UNEXPLAINED_GAP

@@ -112,11 +112,6 @@ class Selection:
         """The steps that added an effect."""
         return tuple(s for s in self.steps if s.accepted)
 
-    @property
-    def models_between(self) -> tuple[Model, ...]:
-        """The models up to each accepted effect but the last."""
-        return tuple(s.best.fit.model for s in self.accepted[:-1])
-
     def explained(self, score: Score) -> float:
         """Share X of the gap of the baseline that is explained at a score, 0 to 1; the worst record is ignored."""
         first = self.steps[0].before if self.steps else self.score

@@ -38,7 +38,7 @@ def effect_table(answer: Mapping[str, Any]) -> Table | None:
     header = ("effect", "family", "share of the gap", "confusable with", "parameter", "value", "95 %")
     several = len({row[0] for row in rows}) > 1
     note = "The share is the decrease of the RMS error above the noise floor, in the records of the gap." + (
-        " Each row states the share that this effect and all effects above it explain together." if several else ""
+        " It is that of all these effects together." if several else ""
     )
     return Table("Effects found", header, tuple(rows), note, frozenset({2, 5, 6})) if rows else None
 
