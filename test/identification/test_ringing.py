@@ -76,3 +76,16 @@ def test_one_mode_is_not_taken_for_two():
     played = tuple(stage.play(growing_sine(f, PERIOD), PERIOD, f"sine_{f:g}hz") for f in (1.0, 10.0))
     (said,) = (n.message for n in identify(Experiment(played), memory=True).notices if n.kind == "ringing")
     assert "one at" not in said
+
+
+@pytest.mark.parametrize("mode", [1284.0, pytest.param(1860.0, marks=pytest.mark.soak)])
+def test_samples_that_ring_at_another_frequency_than_the_stage_are_given_no_mode(mode):
+    """Of 1284 Hz, samples every 0.5 ms show 716 Hz. A mode of 716 Hz that moves against the drive was stated."""
+    stage = Nanopositioner(mode=mode, zeta=0.017, pole=1e-6, delay=2.3e-4)
+    played = {f: stage.play(growing_sine(f, PERIOD), PERIOD, f"sine_{f:g}hz") for f in (1.0, 60.0)}
+    found = identify(Experiment((played[1.0],)), memory=True)
+    assert "extra_resonance" not in found.model
+    (said,) = (n.message for n in found.notices if n.kind == "ringing")
+    assert " Hz" not in said
+    free = free_per_record(found.model, offset=True)
+    assert errors(found.model, Experiment((played[60.0],)), free).percent < 0.1

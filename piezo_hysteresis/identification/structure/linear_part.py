@@ -228,6 +228,9 @@ def _with_second_mode(best: PieceFit, pieces: Sequence[RecordPiece], floors: Seq
     found = min(tried, key=lambda f: f.cost, default=best)
     if not _after_steps(found, pieces) < SECOND * _after_steps(best, pieces):
         return best
+    alone = fit_structure(found.model.without(ExtraResonance.name), pieces, floors)
+    if not _after_steps(found, pieces) < SECOND * _after_steps(alone, pieces):
+        found = alone  # the first mode was none
     return found if real_poles(found.model) else _with_pole(found, pieces, floors)
 
 

@@ -54,7 +54,10 @@ SHAPE, SHARE = tuple(f"{ExtraResonance.name}.{n}" for n in ("f0", "zeta")), f"{E
 
 
 def with_mode(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
-    """The fit with a mode, if the stage rings or its gain rises with frequency; else `plain`."""
+    """The fit with a mode, if the stage rings or its gain rises with frequency; else `plain`.
+
+    Slow motion is that of the drive, so a line whose mode would move against the drive is an alias of a faster mode.
+    """
     found = plain
     for frequency, kind in ringing_lines(plain.model, pieces):
         mode = ExtraResonance(r=1.0, f0=frequency, zeta=DAMPING)
@@ -62,7 +65,7 @@ def with_mode(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[f
         described = misfit_of(kind, rings, pieces) < RINGING_STAYS * misfit_of(kind, plain, pieces)
         fitted = rings.model[ExtraResonance.name]
         stays = max(fitted["f0"] / frequency, frequency / fitted["f0"]) < SAME_LINE and fitted["zeta"] <= RINGS
-        if described and stays and rings.cost < found.cost:
+        if described and stays and fitted["r"] > 0.0 and rings.cost < found.cost:
             found = rings
     if found is plain or abs(found.model.values()[SHARE] - 1.0) > WHOLE:
         silent = _silent(plain, pieces, floors)
