@@ -84,3 +84,13 @@ def test_the_lag_of_one_rate_is_not_taken_for_creep():
     found = identify(played(Nanopositioner(), 10.0), memory=True)
     assert lag(found.fit)[1] < 0.1 * PERIOD
     assert found.model["arx"].pole_radius < 0.8
+
+
+def test_no_low_pass_is_stated_that_the_stage_has_not():
+    """A time constant of 0 s was stated as that of an amplifier."""
+    stage = Nanopositioner(mode=500.0, zeta=0.0107, pole=1e-6, delay=1.6e-4)
+    drives = {f"sine_{f:g}hz": growing_sine(f, PERIOD) for f in (1.0, 60.0)}
+    found = identify(Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives.items())), memory=True)
+    assert "amplifier" not in {notice.kind for notice in found.notices}
+    assert lag_holds(found, stage, PERIOD)
+    assert found.model["extra_resonance"]["f0"] == pytest.approx(stage.mode, rel=1e-3)

@@ -22,10 +22,10 @@ import numpy as np
 
 from ...effects import AmplifierSlewLimitHeld, Arx, ExtraResonance
 from ...model.model import Model
-from .mode import DAMPING, SHAPE, SHARE, held_by, mode_is_inferred, rings_as_a_whole, with_mode
+from .mode import DAMPING, SHAPE, SHARE, held_by, mode_is_inferred, rings_as_a_whole, rings_at, with_mode
 from .piece_fit import DELAY, Array, PieceFit
 from .pieces import Kind, RecordPiece
-from .pole_place import LinearPart, in_every_place, real_poles, with_pole
+from .pole_place import POLE_GAINS, LinearPart, in_every_place, real_poles, with_pole
 from .ringing import decay_after_steps, ringing_lines, sampled_decay
 from .step_edge import with_slew_limit
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
@@ -50,8 +50,6 @@ after a step remains; without one, `DESCRIBED` counts. So is a largest slope of 
 this share of the cost, too: a slope that the first samples just show takes the place of a lag."""
 SHOWN = 0.98
 """Largest share of the power after a step that a slope of the drive leaves without any mode, if the steps show it."""
-POLE_GAINS = 0.98
-"""A pole is accepted if at most this share of the cost remains."""
 RESOLVES = 0.005
 """Largest share of the power after a step that a mode leaves; an alias leaves 0.007 to 0.4, most modes below 0.003."""
 CONTRADICTED = 0.5
@@ -225,12 +223,14 @@ def _with_second_mode(best: PieceFit, pieces: Sequence[RecordPiece], floors: Seq
     lines = [ExtraResonance(r=1.0, f0=f, zeta=DAMPING) for f, _ in ringing_lines(best.model, pieces)]
     models = [_with_factor(best.model, sampled_decay(line, best.model.sample_period)) for line in lines]
     tried = [fit_structure(m, pieces, floors, held_by(best)) for m in models]
-    found = min(tried, key=lambda f: f.cost, default=best)
-    if not _after_steps(found, pieces) < SECOND * _after_steps(best, pieces):
+    found, line = min(zip(tried, lines, strict=True), key=lambda f: f[0].cost, default=(best, None))
+    if line is None or not _after_steps(found, pieces) < SECOND * _after_steps(best, pieces):
         return best
     alone = fit_structure(found.model.without(ExtraResonance.name), pieces, floors)
-    if not _after_steps(found, pieces) < SECOND * _after_steps(alone, pieces):
-        found = alone  # the first mode was none
+    if not _after_steps(found, pieces) < SECOND * _after_steps(alone, pieces):  # the first mode was none
+        moved = fit_structure(best.model.with_effect(line), pieces, floors)
+        is_told = rings_at(line["f0"], moved.model) and not max(_shares_left(alone, moved, pieces)) < SECOND
+        found = moved if is_told else alone
     return found if real_poles(found.model) else _with_pole(found, pieces, floors)
 
 

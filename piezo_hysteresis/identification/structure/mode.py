@@ -54,24 +54,25 @@ SHAPE, SHARE = tuple(f"{ExtraResonance.name}.{n}" for n in ("f0", "zeta")), f"{E
 
 
 def with_mode(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:
-    """The fit with a mode, if the stage rings or its gain rises with frequency; else `plain`.
-
-    Slow motion is that of the drive, so a line whose mode would move against the drive is an alias of a faster mode.
-    """
+    """The fit with a mode, if the stage rings or its gain rises with frequency; else `plain`."""
     found = plain
     for frequency, kind in ringing_lines(plain.model, pieces):
         mode = ExtraResonance(r=1.0, f0=frequency, zeta=DAMPING)
         rings = fit_structure(plain.model.with_effect(mode), pieces, floors)
         described = misfit_of(kind, rings, pieces) < RINGING_STAYS * misfit_of(kind, plain, pieces)
-        fitted = rings.model[ExtraResonance.name]
-        stays = max(fitted["f0"] / frequency, frequency / fitted["f0"]) < SAME_LINE and fitted["zeta"] <= RINGS
-        if described and stays and fitted["r"] > 0.0 and rings.cost < found.cost:
+        if described and rings_at(frequency, rings.model) and rings.cost < found.cost:
             found = rings
     if found is plain or abs(found.model.values()[SHARE] - 1.0) > WHOLE:
         silent = _silent(plain, pieces, floors)
         if silent.cost < SILENT_GAINS * found.cost:
             found = silent
     return found
+
+
+def rings_at(line: float, model: Model) -> bool:
+    """Whether the mode of a model explains a line [Hz]; one that moves against the drive is an alias."""
+    mode = model[ExtraResonance.name]
+    return max(mode["f0"] / line, line / mode["f0"]) < SAME_LINE and mode["zeta"] <= RINGS and mode["r"] > 0.0
 
 
 def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:

@@ -39,6 +39,8 @@ from .structure_fit import fit_structure
 
 OPEN = 1.2
 """Largest ratio of the costs for which it is open where the pole is."""
+POLE_GAINS = 0.98
+"""A pole is accepted if at most this share of the cost remains."""
 LATE = 0.1
 """Difference between the lags of steps and of other motion that is told [samples]."""
 
@@ -98,7 +100,10 @@ class LinearPart:
 
 
 def in_every_place(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> list[PieceFit]:
-    """The fit, and if its dynamics have one pole, those with it before the hysteresis instead; the best one first."""
+    """The fit, and if its dynamics have one pole, those with it before the hysteresis instead; the best one first.
+
+    What was fitted after the pole may describe the records without it; then the fit without it is the first.
+    """
     poles = real_poles(found.model)
     if len(poles) != 1:
         return [found]
@@ -106,7 +111,11 @@ def in_every_place(found: PieceFit, pieces: Sequence[RecordPiece], floors: Seque
     bare = _without_pole(found.model, poles[0])
     forms = (bare.with_effect(form(tau=min(tau, form.parameters[0].upper))) for form in AMPLIFIERS)
     tried = (fit_structure(model, pieces, floors, held_by(found)) for model in forms)
-    return sorted((found, *tried), key=lambda f: f.cost)
+    places = sorted((found, *tried), key=lambda f: f.cost)
+    amplifier = amplifier_of(places[0].model)
+    bare = places[0].model.without(amplifier.name) if amplifier else bare
+    without = fit_structure(bare, pieces, floors, held_by(found))
+    return places if places[0].cost < POLE_GAINS * without.cost else [without, *places]
 
 
 def with_pole_behind(model: Model) -> Model:
