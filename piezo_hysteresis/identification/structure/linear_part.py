@@ -195,12 +195,15 @@ def _with_two_more_orders(
     """The fit with ARX of two more orders if it describes the response to the steps, else `best`.
 
     A mode above half the sampling rate rings at another frequency in the samples and has zeros that a mode has not.
-    Therefore such a mode leaves a part of the residual after the steps. A mode that leaves hardly anything stays. The
-    fit begins with the poles of the mode that was found, or with poles that explain the residual after the steps, and
-    with a pair of equal zeros, which is the response of the fit before.
+    Therefore such a mode leaves a part of the residual after the steps, or needs poles beside it. A mode that leaves
+    hardly anything without them stays; one that needs two has more numbers than the fit that is tried. The fit begins with the poles of the mode that was found, or
+    with poles that explain the residual after the steps, and with a pair of equal zeros, which is the response of the
+    fit before.
     """
     rings = ExtraResonance.name in best.model and not mode_is_inferred(best.model)
-    if rings and not _after_steps(best, pieces) > RESOLVES * _after_steps(plain, pieces):  # also without any step
+    poles = best.model[Arx.name].array("a").size
+    leaves = _after_steps(best, pieces) > RESOLVES * _after_steps(plain, pieces)  # not without any step
+    if rings and not poles and not leaves:
         return best
     before = plain if ExtraResonance.name in best.model else best
     decay = (
@@ -211,6 +214,8 @@ def _with_two_more_orders(
     if decay is None:
         return best
     found = fit_structure(_with_factor(before.model, decay), pieces, floors)
+    if rings and poles > 1:
+        return best if best.cost < POLE_GAINS * found.cost else found
     shares = _shares_left(found, best, pieces)
     return found if max(shares) < 1.0 and min(shares) < DESCRIBED else best
 

@@ -130,25 +130,34 @@ def mode_notices(fit: PieceFit) -> list[Notice]:
     if ExtraResonance.name not in fit.model:
         if not rings:
             return []
-        order = dynamics_of(fit.model).poles.size
+        order, line = dynamics_of(fit.model).poles.size, _frequency(min(rings, key=_damping), fit.model)
         said = f"the stage rings after steps; ARX of order {order} describes its samples better than a mode does"
-        return [Notice("ringing", said)]
+        return [Notice("ringing", f"{said}; they ring at {line:.4g} Hz{_alike(line, fit.model)}")]
     mode = fit.model[ExtraResonance.name]
     shown = f"a mode at {mode['f0']:.4g} Hz with"
     if not mode_is_inferred(fit.model):
         said = f"the stage rings after steps or sharp turns: {shown} a damping ratio of {mode['zeta']:.2g}"
         for pole in (p for p in rings if p.imag > 0.0):  # a negative pole is none of a mode that the samples show
-            frequency = abs(np.log(pole)) / (2.0 * np.pi * fit.model.sample_period)
-            said += f", and one at {frequency:.4g} Hz in the ARX dynamics with {_damping(pole):.2g}"
-        alias = 1.0 / fit.model.sample_period - mode["f0"]
-        if alias < FARTHEST_ALIAS * mode["f0"]:
-            said += f"; a mode at {alias:.4g} Hz would ring alike in samples every {fit.model.sample_period:.3g} s"
+            said += f", and one at {_frequency(pole, fit.model):.4g} Hz in the ARX dynamics with {_damping(pole):.2g}"
+        if 1.0 / fit.model.sample_period < (1.0 + FARTHEST_ALIAS) * mode["f0"]:
+            said += _alike(mode["f0"], fit.model)
     else:
         said = (
             f"the gain changes with the frequency of the drive; {shown} a share of {mode['r']:.3g} stands for this, "
             "but its frequency, damping and share and the delay are not determined separately and have no intervals"
         )
     return [Notice("ringing", said)]
+
+
+def _frequency(pole: complex, model: Model) -> float:
+    """Natural frequency of a pole of the samples [Hz]."""
+    return float(abs(np.log(pole)) / (2.0 * np.pi * model.sample_period))
+
+
+def _alike(line: float, model: Model) -> str:
+    """What is said of the alias of a line [Hz]."""
+    alias = 1.0 / model.sample_period - line
+    return f"; a mode at {alias:.4g} Hz would ring alike in samples every {model.sample_period:.3g} s"
 
 
 def _damping(pole: complex) -> float:
