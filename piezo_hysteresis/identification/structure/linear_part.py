@@ -30,6 +30,7 @@ from .ringing import decay_after_steps, ringing_lines, sampled_decay
 from .step_edge import with_slew_limit
 from .step_weights import lateness_of_steps, misfit_beside_steps, without_steps
 from .structure_fit import SETTLED, fit_structure, is_settled, misfit_of
+from .uncertainty import BETWEEN_SAMPLES
 
 LAGS = (0.3, 1.5, 4.0)
 """Start values of the delay [samples]."""
@@ -195,15 +196,16 @@ def _with_two_more_orders(
     """The fit with ARX of two more orders if it describes the response to the steps, else `best`.
 
     A mode above half the sampling rate rings at another frequency in the samples and has zeros that a mode has not.
-    Therefore such a mode leaves a part of the residual after the steps, or needs poles beside it. A mode that leaves
-    hardly anything without them stays; one that needs two has more numbers than the fit that is tried. The fit begins with the poles of the mode that was found, or
+    Therefore such a mode leaves a part of the residual after the steps, or moves against the drive, or needs poles and
+    no delay, although a held drive is late by half a sample. Any other mode that leaves hardly anything stays. The fit begins with the poles of the mode that was found, or
     with poles that explain the residual after the steps, and with a pair of equal zeros, which is the response of the
     fit before.
     """
     rings = ExtraResonance.name in best.model and not mode_is_inferred(best.model)
-    poles = best.model[Arx.name].array("a").size
+    leads = best.model[Arx.name].array("a").size if best.model[Arx.name]["delay"] < BETWEEN_SAMPLES else 0
+    against = rings and best.model.values()[SHARE] < 0.0
     leaves = _after_steps(best, pieces) > RESOLVES * _after_steps(plain, pieces)  # not without any step
-    if rings and not poles and not leaves:
+    if rings and not leads and not leaves and not against:
         return best
     before = plain if ExtraResonance.name in best.model else best
     decay = (
@@ -214,7 +216,7 @@ def _with_two_more_orders(
     if decay is None:
         return best
     found = fit_structure(_with_factor(before.model, decay), pieces, floors)
-    if rings and poles > 1:
+    if against or (rings and leads > 1):  # the mode is none, or has more numbers than the fit
         return best if best.cost < POLE_GAINS * found.cost else found
     shares = _shares_left(found, best, pieces)
     return found if max(shares) < 1.0 and min(shares) < DESCRIBED else best
@@ -232,7 +234,7 @@ def _with_second_mode(best: PieceFit, pieces: Sequence[RecordPiece], floors: Seq
     if line is None or not _after_steps(found, pieces) < SECOND * _after_steps(best, pieces):
         return best
     alone = fit_structure(found.model.without(ExtraResonance.name), pieces, floors)
-    if not _after_steps(found, pieces) < SECOND * _after_steps(alone, pieces):  # the first mode was none
+    if not found.cost < POLE_GAINS * alone.cost:  # the first mode was none
         moved = fit_structure(best.model.with_effect(line), pieces, floors)
         is_told = rings_at(line["f0"], moved.model) and not max(_shares_left(alone, moved, pieces)) < SECOND
         found = moved if is_told else alone

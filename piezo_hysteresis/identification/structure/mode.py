@@ -70,9 +70,9 @@ def with_mode(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[f
 
 
 def rings_at(line: float, model: Model) -> bool:
-    """Whether the mode of a model explains a line [Hz]; one that moves against the drive is an alias."""
+    """Whether the mode of a model explains a line [Hz]."""
     mode = model[ExtraResonance.name]
-    return max(mode["f0"] / line, line / mode["f0"]) < SAME_LINE and mode["zeta"] <= RINGS and mode["r"] > 0.0
+    return max(mode["f0"] / line, line / mode["f0"]) < SAME_LINE and mode["zeta"] <= RINGS
 
 
 def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> PieceFit:

@@ -40,7 +40,7 @@ from .structure_fit import fit_structure
 OPEN = 1.2
 """Largest ratio of the costs for which it is open where the pole is."""
 POLE_GAINS = 0.98
-"""A pole is accepted if at most this share of the cost remains."""
+"""A pole is accepted if at most this share of the cost remains; a first mode stays beside a second by the same rule."""
 LATE = 0.1
 """Difference between the lags of steps and of other motion that is told [samples]."""
 
