@@ -104,9 +104,10 @@ class Diagnosis(Pictured):
             return ()
         rejections: dict[str, Rejection] = {}
         closest = [s.best.name for s in self.selection.accepted]
+        closed = f"{100 * self.selection.explained(self.selection.score):.0f} % of the gap"
         for step in self.selection.steps:
             if self.verdict is Verdict.UNKNOWN and step.accepted:
-                name, closed = step.best.name, f"{100 * self.selection.explained(self.selection.score):.0f} % of the gap"
+                name = step.best.name
                 reason = f"it is the closest effect, but explains only {closed}"
                 if len(closest) > 1:
                     reason = f"the closest effects, {' and '.join(closest)}, explain only {closed} together"

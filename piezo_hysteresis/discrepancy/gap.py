@@ -25,7 +25,6 @@ import scipy
 
 from ..blocks.block import Array
 from ..effects import MainsHum
-from ..errors import DivergenceError
 from ..identification.fit.normal_equations import Nuisance
 from ..identification.free_run_error import free_per_record, residuals_on
 from ..identification.records.excitation_check import moves

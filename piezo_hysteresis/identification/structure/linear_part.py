@@ -197,9 +197,9 @@ def _with_two_more_orders(
 
     A mode above half the sampling rate rings at another frequency in the samples and has zeros that a mode has not.
     Therefore such a mode leaves a part of the residual after the steps, or moves against the drive, or needs poles and
-    no delay, although a held drive is late by half a sample. Any other mode that leaves hardly anything stays. The fit begins with the poles of the mode that was found, or
-    with poles that explain the residual after the steps, and with a pair of equal zeros, which is the response of the
-    fit before.
+    no delay, although a held drive is late by half a sample. Any other mode that leaves hardly anything stays. The fit
+    begins with the poles of the mode that was found, or with poles that explain the residual after the steps, and with
+    a pair of equal zeros, which is the response of the fit before.
     """
     rings = ExtraResonance.name in best.model and not mode_is_inferred(best.model)
     leads = best.model[Arx.name].array("a").size if best.model[Arx.name]["delay"] < BETWEEN_SAMPLES else 0
