@@ -103,22 +103,24 @@ class Diagnosis(Pictured):
         if self.selection is None:
             return ()
         rejections: dict[str, Rejection] = {}
-        closest = [s.best.name for s in self.selection.accepted]
-        closed = f"{100 * self.selection.explained(self.selection.score):.0f} % of the gap"
         for step in self.selection.steps:
             if self.verdict is Verdict.UNKNOWN and step.accepted:
                 name = step.best.name
-                reason = f"it is the closest effect, but explains only {closed}"
-                if len(closest) > 1:
-                    reason = f"the closest effects, {' and '.join(closest)}, explain only {closed} together"
-                if self.gap is not None and self.model is not None and name in self.model:
-                    share = f"{100 * self.gap.explained:.0f} % of the gap"
-                    reason = f"it is in the model but not named: the model explains {share}"
-                rejections[name] = Rejection(name, reason)
+                rejections[name] = Rejection(name, self._why_unnamed(name, self.selection))
             for rejection in step.rejected:
                 rejections[rejection.name] = rejection
         forms = {e.name for e in CHAIN if e.public_name() in self.names}
         return tuple(r for r in rejections.values() if r.name not in forms)
+
+    def _why_unnamed(self, name: str, selection: Selection) -> str:
+        """Why an effect is not named that the search added."""
+        if self.gap is not None and self.model is not None and name in self.model:
+            return f"it is in the model but not named: the model explains {100 * self.gap.explained:.0f} % of the gap"
+        closed = f"{100 * selection.explained(selection.score):.0f} % of the gap"
+        closest = [s.best.name for s in selection.accepted]
+        if len(closest) > 1:
+            return f"the closest effects, {' and '.join(closest)}, explain only {closed} together"
+        return f"it is the closest effect, but explains only {closed}"
 
     def effects(self) -> list[dict[str, Any]]:
         """The named effects, as in ``answer.json``."""

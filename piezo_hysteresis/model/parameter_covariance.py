@@ -135,12 +135,12 @@ def _relative_slope(model: Model, name: str, value: float, step: float, z: Respo
         step = -step
         moved = model.with_values({name: value + step})
     total = np.zeros_like(z)
-    for own, other in zip(_sections(model), _sections(moved), strict=True):
+    for own, other in zip(linear_sections(model), linear_sections(moved), strict=True):
         for sign, now, then in zip((1.0, -1.0), own, other, strict=True):
             total = total + sign * np.polyval(np.polysub(then[::-1], now[::-1]) / step, z) / np.polyval(now[::-1], z)
     return total
 
 
-def _sections(model: Model) -> list[Section]:
+def linear_sections(model: Model) -> list[Section]:
     """Response of all linear dynamics of the chain."""
     return [section for block in model.at(model.sample_period).blocks for section in block.sections()]

@@ -39,7 +39,7 @@ def noise(size, seed):
 def then_a_triangle(drive):
     """The record with this drive, and a slower one that continues it."""
     first = Record(drive, drive, PERIOD)
-    loops = 2.0 + 2.0 * np.abs((np.arange(4000) / 1000 + 1.0) % 2.0 - 1.0) - 2.0
+    loops = 2.0 * np.abs((np.arange(4000) / 1000 + 1.0) % 2.0 - 1.0)
     return first, Record(loops, loops, 1e-3, start_time=first.duration, continues=True)
 
 

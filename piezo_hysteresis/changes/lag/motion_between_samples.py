@@ -22,6 +22,7 @@ import scipy
 from ...effects import ExtraResonance
 from ...identification.structure.mode import mode_is_inferred
 from ...model.model import Model
+from ...model.parameter_covariance import linear_sections
 
 SETTLES = 256
 """Number of samples of the response to a step."""
@@ -36,8 +37,7 @@ def unseen_lag(model: Model) -> float:
     if ExtraResonance.name in model and not mode_is_inferred(model):
         return 0.0
     response = np.ones(SETTLES)
-    for block in model.at(model.sample_period).blocks:
-        for numerator, denominator in block.sections():
-            response = scipy.signal.lfilter(numerator, denominator, response)
+    for numerator, denominator in linear_sections(model):
+        response = scipy.signal.lfilter(numerator, denominator, response)
     share = np.abs(np.diff(response, prepend=0.0)).max() / abs(response[-1])
     return float(share * model.sample_period)

@@ -75,8 +75,7 @@ class OtherFilter:
         """A signal of the record behind the filter with a lag [s]."""
         late, one, two = self.times(lag)
         period = prediction.record.sample_period
-        if two > 0.0:
-            signal = filtered_by(prediction, signal, before, two, self.zeta)
+        signal = filtered_by(prediction, signal, before, two, self.zeta)
         if one > 0.0:
             signal = filtered(derivatives(signal, before), before, period, one)
         return shifted(derivatives(signal, before), late / period)

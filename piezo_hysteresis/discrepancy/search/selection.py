@@ -72,9 +72,9 @@ def select(
         Called with a message and the fraction done.
     """
     report = progress or (lambda word, fraction: None)
-    baseline, steps, accepted, in_time = model, list[Step](), 0, False
+    baseline, steps, in_time = model, list[Step](), False
     with suppress(TimeSpentError):
-        while (score.excess > ADEQUATE or (accepted and score.cost > LEAST_GAIN)) and accepted < MOST:
+        while (score.excess > ADEQUATE or (steps and score.cost > LEAST_GAIN)) and len(steps) < MOST:
             step = _turn(model, training_data, score, effects, report)
             if step is None:
                 break
@@ -82,7 +82,6 @@ def select(
             if not step.accepted:
                 break
             model, score, training_data = step.best.fit.model, step.best.score, step.best.training_data
-            accepted += 1
         in_time = True
     return Selection(baseline, model, score, tuple(steps), training_data.null, in_time, training_data)
 

@@ -28,8 +28,8 @@ from .bounded_step import bounded_step
 
 Array = NDArray[np.float64]
 
-LARGEST = 0.99999
-"""Largest radius of a pole to which a step leads, unless the model has a larger one. Nearer to 1, a zero cancels the
+LARGEST_POLE = 0.99999
+"""Largest radius of a pole that is estimated, unless a fit begins with a larger one. Nearer to 1, a zero cancels the
 pole almost completely, and what is left of its sensitivities is rounding errors."""
 SHORTEST = 1e-3
 """Share of a step of the poles from which it is not shortened further; then the poles are not changed."""
@@ -73,7 +73,7 @@ def stable_step(
 
     if not poles:
         return full
-    largest = max(LARGEST, model.effect(Arx).pole_radius)
+    largest = max(LARGEST_POLE, model.effect(Arx).pole_radius)
     if is_stable(full):
         return full
     others = ~directions[poles].any(axis=0)

@@ -30,12 +30,11 @@ from scipy.linalg import lstsq
 from ...effects import Arx, Discretisation
 from ...errors import IdentificationError, ParameterError
 from ...record import Notice, Samples
+from ..fit.stable_step import LARGEST_POLE
 from .regressors import Signals, triangle
 
 _ALL = slice(None)
 """Selects every regressor."""
-LARGEST_POLE = 0.99999
-"""Radius to which poles on or just outside the unit circle are moved."""
 DRAWN_IN = 0.9999
 """Largest radius of a pole if rounding errors do not allow the radius above."""
 

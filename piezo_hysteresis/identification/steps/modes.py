@@ -30,7 +30,8 @@ import scipy
 from numpy.typing import NDArray
 
 from ...errors import IdentificationError
-from .dynamics import LARGEST_POLE, Dynamics, identify_arx, in_free_run, settling
+from ..fit.stable_step import LARGEST_POLE
+from .dynamics import Dynamics, identify_arx, in_free_run, settling
 from .regressors import Signals
 
 Array = NDArray[np.float64]

@@ -202,10 +202,10 @@ def _with_two_more_orders(
     a pair of equal zeros, which is the response of the fit before.
     """
     rings = ExtraResonance.name in best.model and not mode_is_inferred(best.model)
-    leads = best.model[Arx.name].array("a").size if best.model[Arx.name]["delay"] < BETWEEN_SAMPLES else 0
+    early_poles = best.model[Arx.name].array("a").size if best.model[Arx.name]["delay"] < BETWEEN_SAMPLES else 0
     against = rings and best.model.values()[SHARE] < 0.0
     leaves = _after_steps(best, pieces) > RESOLVES * _after_steps(plain, pieces)  # not without any step
-    if rings and not leads and not leaves and not against:
+    if rings and not early_poles and not leaves and not against:
         return best
     before = plain if ExtraResonance.name in best.model else best
     decay = (
@@ -216,7 +216,7 @@ def _with_two_more_orders(
     if decay is None:
         return best
     found = fit_structure(_with_factor(before.model, decay), pieces, floors)
-    if against or (rings and leads > 1):  # the mode is none, or has more numbers than the fit
+    if against or (rings and early_poles > 1):  # the mode is none, or has more numbers than the fit
         return best if best.cost < POLE_GAINS * found.cost else found
     shares = _shares_left(found, best, pieces)
     return found if max(shares) < 1.0 and min(shares) < DESCRIBED else best
