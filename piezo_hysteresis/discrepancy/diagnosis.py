@@ -182,7 +182,7 @@ class Diagnosis(Pictured):
             lines.append(f"  {row['name']} ({row['family']})")
             for name, p in row["parameters"].items():
                 ends = p["interval_95"]
-                known = f"95 %: {ends[0]:.4g} to {ends[1]:.4g}" if ends else "not fitted"
+                known = f"95 %: {ends[0]:.4g} to {ends[1]:.4g}" if ends else "not determined"
                 lines.append(f"    {name} = {p['value']:.4g} {p['unit']} ({known})")
             if row["confusable_with"]:
                 lines.append(f"    the data cannot distinguish it from {', '.join(row['confusable_with'])}")
@@ -209,7 +209,8 @@ def _parameters(fit: Fit, effect: str) -> dict[str, dict[str, Any]]:
         owner, _, parameter = name.partition(".")
         row = fit.model.row(name)
         if owner == effect and not row.fixed and not row.per_record:
-            ends = fit.interval(name) if name in fit.names else None  # an assumed number has no interval
+            # a number that was assumed, or does not act in these records, has no interval
+            ends = fit.interval(name) if fit.standard_errors.get(name) else None
             interval = None if ends is None else [min(max(end, row.lower), row.upper) for end in ends]
             rows[parameter] = {"value": value, "interval_95": interval, "unit": row.unit}
     return rows

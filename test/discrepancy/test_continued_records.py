@@ -26,6 +26,8 @@ from piezo_hysteresis.recording import read
 pytestmark = pytest.mark.soak
 CORNER = 10e3
 """Corner of the amplifier of every simulated stage [Hz]."""
+GAIN = 20.0
+"""Gain of this amplifier."""
 
 
 def simulated(folder, seed):
@@ -46,6 +48,24 @@ def test_the_lag_beside_a_backlash_is_found_and_both_are_as_hidden(tmp_path):
     low, high = found.fit.interval(pole)
     assert low < 1.0 / (2.0 * np.pi * CORNER) < high
     assert found.gap.after < 1.1 * found.gap.floor
+
+
+def test_a_lag_is_named_although_the_records_on_average_are_at_the_floor(tmp_path):
+    experiment, truth = simulated(tmp_path, 12)
+    found = diagnose(experiment)
+    assert found.names == ("amplifier_bandwidth",)
+    (pole,) = (n for n in found.fit.names if n.endswith(".tau"))
+    low, high = found.fit.interval(pole)
+    assert low < 1.0 / (2.0 * np.pi * truth["electronics.amplifier_bandwidth"]) < high
+    assert found.gap.after < 1.1 * found.gap.floor
+
+
+def test_the_interval_of_a_largest_slope_contains_the_time_between_samples(tmp_path):
+    experiment, truth = simulated(tmp_path, 4)
+    found = diagnose(experiment)
+    assert found.names == ("amplifier_slew_limit",)
+    low, high = found.fit.interval("amplifier_slew_limit.S")
+    assert low < truth["electronics.amplifier_slew"] / GAIN < high
 
 
 def test_a_drift_is_named_beside_dynamics_that_could_imitate_it(tmp_path):

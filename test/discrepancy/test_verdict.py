@@ -28,7 +28,7 @@ from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.discrepancy.verdict import Conclusion, is_explained, named_conclusion, unnamed_conclusion
-from piezo_hysteresis.effects import Arx, BoucWen, Creep, MainsHum
+from piezo_hysteresis.effects import AmplifierSaturation, Arx, BoucWen, Creep, MainsHum
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
@@ -91,6 +91,21 @@ def test_no_effect_of_several_is_said_to_explain_nothing():
     assert "explain 100 % of the gap" in diagnosis.reason
     for text in (diagnosis.summary(), repr(effect_table(diagnosis.answer())), diagnosis._repr_html_()):
         assert "100 %" in text and not re.search(r"\b0 %", text)
+
+
+def test_a_limit_that_is_never_reached_has_no_interval():
+    """Without influence its variance is 0, which was stated as an interval from -1e9 to -1e9 V."""
+    limit, first = AmplifierSaturation(upper=8.7), selection(0.9, 1.0)
+    names = tuple(f"amplifier_saturation.{n}" for n in ("lower", "upper"))
+    fit = Fit(STAGE.with_effect(limit), names, np.diag([0.0, 1e-4]), 1.0, (), (), (), True, 1)
+    (step,) = first.steps
+    found = replace(first, steps=(replace(step, best=replace(step.best, effect=limit, fit=fit)),))
+    gap = Gap(1.0, 0.1, 0.1, None, (PhaseGap("triangle", 0, 1.0, 0.1, 0.1),), True, 0.1)
+    diagnosis = Diagnosis(Conclusion.MISSING_EFFECT, "", fit.model, STAGE, Experiment((RECORD,)), found, fit, gap=gap)
+    (effect,) = diagnosis.effects()
+    assert effect["parameters"]["lower"]["interval_95"] is None
+    assert effect["parameters"]["upper"]["interval_95"] == pytest.approx([8.7 - 0.0196, 8.7 + 0.0196])
+    assert "-1e+09 V (not determined)" in diagnosis.summary()
 
 
 def test_the_closest_answer_is_all_that_was_added():

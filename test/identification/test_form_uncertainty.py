@@ -14,12 +14,14 @@
 
 """Intervals that do not shrink with the length of a record: closed form for one gain, and a stage of other form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from piezo_hysteresis.effects import AmplifierBandwidth, Arx, BoucWen, Offset
+from piezo_hysteresis.effects import AmplifierBandwidth, AmplifierSlewLimit, Arx, BoucWen, Offset
 from piezo_hysteresis.identification.fit.fit import fit
-from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY, PIECES, with_form_uncertainty
+from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY, PIECES, slope_spread, with_form_uncertainty
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.model.model import Model
@@ -65,6 +67,30 @@ def test_a_lag_is_known_to_one_sample_at_best():
     found = fit(model, (record,), [name], floors=[noise])
     found = with_form_uncertainty(found, (record,), Nuisance(), [noise], [noise], SPAN)
     assert found.standard_errors[name] > period / np.sqrt(12.0)
+
+
+def test_a_largest_slope_is_known_to_one_sample_of_the_longest_rise():
+    """A step of 8 V at 1 V a sample; a slow triangle says nothing."""
+    period, slope, name = 1e-4, 1e4, "amplifier_slew_limit.S"
+    model = Model((AmplifierSlewLimit(S=slope), *MODEL.effects), period, 1.0, 1e-5)
+    at_rest, triangle = np.full(50, -4.0), 5.0 - np.abs(np.linspace(-5.0, 5.0, 10_000))
+    steps = np.concatenate((at_rest, at_rest + 8.0, at_rest + 5.0))
+    records = [Record(u, model.simulate(Record(u, np.zeros(u.size), period))[0], period) for u in (steps, triangle)]
+    noise = [1e-9, 1e-9]
+    found = fit(model, records, [name], floors=noise)
+    wider = with_form_uncertainty(found, records, Nuisance(), noise, noise, 1e-12)
+    added = wider.standard_errors[name] ** 2 - found.standard_errors[name] ** 2
+    assert np.sqrt(added) == pytest.approx(slope**2 * period / 8.0 / np.sqrt(12.0), rel=1e-3)
+
+
+def test_the_rise_of_a_drive_counts_only_where_it_is_fast():
+    period, slope = 1e-3, 100.0
+    sawtooth = np.concatenate((np.linspace(0.0, 9.0, 1000), [6.0, 3.0, 3.01, 0.0]))
+    record = Record(sawtooth, np.zeros(sawtooth.size), period)
+    assert slope_spread(record, slope) == pytest.approx(slope**2 * period / 6.0 / np.sqrt(12.0))
+    assert slope_spread(record, 4000.0) == np.inf
+    stepped = replace(record, voltage=np.full(4, 2.0), displacement=np.zeros(4), initial_voltage=-1.0)
+    assert slope_spread(stepped, slope) == pytest.approx(slope**2 * period / 3.0 / np.sqrt(12.0))
 
 
 @pytest.mark.parametrize("averaged", [5, 50])

@@ -35,11 +35,12 @@ from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.form_uncertainty import ADEQUACY
 from ...identification.records.conditioning import path_of, records_to_fit
 from ...identification.records.intersample_error import intersample_error
-from ...identification.records.noise_floor import ADEQUATE, noise_floors, noise_of_averages, stroke
+from ...identification.records.noise_floor import noise_floors, noise_of_averages, stroke
 from ...identification.records.sampling import at_period, common_period, less, shortened, slowed
 from ...identification.start_models import modal_models, start_models
 from ...model.model import Model
 from ...record import Record
+from .candidate_refits import leaves_room
 from .candidates import score_baseline, score_model
 from .refit import FAILURES, LAST, PRECISE, joint
 from .selection_result import Selection
@@ -151,11 +152,11 @@ def prepare_baseline(
         progress("joint fit of the baseline", 0.3)
         baseline = joint(baseline.model, training_data, LAST, PRECISE)
     training_data, score = score_baseline(baseline.model, training_data)
-    if score.excess > ADEQUATE:
+    if leaves_room(score):
         start_helpers()  # effects will be searched for
         for other in starts:
             baseline, score = better_fit(exact(other), baseline, score, training_data)
-    if score.excess > ADEQUATE:
+    if leaves_room(score):
         for modal in modal_models(baseline.model, records, fitted):
             baseline, score = better_fit(modal, baseline, score, training_data, CLEARLY)
     least = _floors(noise, span, lost)

@@ -46,6 +46,11 @@ Fitter = Callable[[Candidate], FittedCandidate | None]
 """Fits a candidate; None if this diverges."""
 
 
+def leaves_room(score: Score) -> bool:
+    """Whether the error is above its floor, or so large in some records that an effect could gain enough."""
+    return score.excess > ADEQUATE or score.cost > LEAST_GAIN
+
+
 def refit_candidates(
     model: Model, candidates: Sequence[Candidate], before: Score, progress: Progress
 ) -> list[FittedCandidate]:

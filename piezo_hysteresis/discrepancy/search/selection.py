@@ -34,6 +34,7 @@ from .candidate_refits import (
     CLOSE,
     LEAST_GAIN,
     finest,
+    leaves_room,
     refit_candidates,
     refits_behind_new_dynamics,
     refits_of_twins,
@@ -74,7 +75,7 @@ def select(
     report = progress or (lambda word, fraction: None)
     baseline, steps, in_time = model, list[Step](), False
     with suppress(TimeSpentError):
-        while (score.excess > ADEQUATE or (steps and score.cost > LEAST_GAIN)) and len(steps) < MOST:
+        while leaves_room(score) and len(steps) < MOST:
             step = _turn(model, training_data, score, effects, report)
             if step is None:
                 break

@@ -41,7 +41,12 @@ class AmplifierSaturation(Effect):
     lower, upper : float
         Limits, as drive voltage before the amplifier [V]; ∓1e9 means no limit.
     corner : float
-        Half width of the bend into each limit [V]; 0 gives hard clipping.
+        Half width c of the bend into each limit [V]; 0 gives hard clipping.
+
+    Notes
+    -----
+    The slope of the bend is that of a uniform distribution, of standard deviation c/√3. A limit of another form has the
+    corner of equal standard deviation: one with the bend s·ln(1 + exp(e/s)), whose slope is logistic, has c = πs.
     """
 
     name = "amplifier_saturation"

@@ -75,7 +75,8 @@ def with_form_uncertainty(
     samples. δ is the adequacy floor, or the residual beyond noise if this is larger.
 
     The signal between two samples is not known. A lag of the model is therefore uncertain by one sample period T with a
-    uniform distribution, which adds T²/12 to its variance.
+    uniform distribution, which adds T²/12 to its variance. So is the time in which an amplifier of largest slope
+    follows a fast rise of the drive (`slope_spread`).
     """
     directions = gauge(fit.model, fit.names)
     bread = np.zeros((directions.shape[1],) * 2)
@@ -90,7 +91,42 @@ def with_form_uncertainty(
             meat += weight**2 * misfit * gram.size / PIECES * inner
     covariance = fit.covariance + sandwich(bread, meat, directions)
     lags = {e.name for e in fit.model.effects if e.family == LAG}
-    for at, name in enumerate(fit.names):
-        if name.partition(".")[0] in lags and fit.model.row(name).unit == "s":
+    fitted = [r for r, floor in zip(records, floors, strict=True) if np.isfinite(floor)]
+    for at, (name, value) in enumerate(fit.values.items()):
+        unit = fit.model.row(name).unit
+        if name.partition(".")[0] in lags and unit == "s":
             covariance[at, at] += fit.model.sample_period**2 / 12.0
+        if unit == "V/s" and np.isfinite(spread := min(slope_spread(r, value) for r in fitted)):
+            covariance[at, at] += spread**2
     return replace(fit, covariance=covariance)
+
+
+def slope_spread(record: Record, slope: float) -> float:
+    """Standard deviation of a largest slope, as the time of a rise is known to within a sample.
+
+    Parameters
+    ----------
+    record : Record
+        Record of one axis.
+    slope : float
+        Largest slope S [V/s], positive.
+
+    Returns
+    -------
+    float
+        S²T/(h√12) [V/s]. The rise h is the largest change of the drive without a sample that is slower than S or turns
+        back. Infinite if the drive is nowhere faster.
+
+    Examples
+    --------
+    A step of 3 V takes 30 samples.
+
+    >>> step = Record(np.array([0.0, 3.0, 3.0]), np.zeros(3), 1e-3)
+    >>> round(slope_spread(step, 100.0), 3)
+    0.962
+    """
+    change = np.diff(record.voltage, prepend=record.settled_voltage)
+    fast = np.where(np.abs(change) > slope * record.sample_period, change, 0.0)
+    starts = np.flatnonzero(np.diff(np.sign(fast), prepend=0.0))
+    rise = np.abs(np.add.reduceat(fast, starts)).max() if starts.size else 0.0
+    return float(slope**2 * record.sample_period / (rise * np.sqrt(12.0))) if rise else np.inf
