@@ -106,6 +106,11 @@ def named_conclusion(selection: Selection, gap: Gap) -> tuple[Conclusion, str]:
         else f"an error of {gap.after / gap.floor:.1f} times the noise floor remains unexplained"
     )
     said = f"The model does not contain {names}, which {explain} {100 * gap.explained:.0f} % of the gap; {rest}."
+    if (excess := selection.score.excess) > ADEQUATE:
+        said += (
+            f" The training records keep an error of {np.sqrt(excess):.1f} floors: the law of the effect may be another "
+            "one, and the intervals hold for this law only."
+        )
     if not selection.in_time:
         said += MORE_MAY_BE_MISSING
     fitted = [e.public_name() for e in accepted if not e.is_predicted_live()]

@@ -70,6 +70,14 @@ def test_nothing_added_explains_nothing():
     assert not is_explained(Selection(STAGE, STAGE, score, (), 1.0))
 
 
+def test_intervals_beside_a_visible_error_are_said_to_hold_for_the_law_only():
+    """The test records alone were at the floor, and the law had another exponent than its interval said."""
+    gap = Gap(1.0, 0.1, 0.1, None, (PhaseGap("triangle", 0, 1.0, 0.1, 0.1),), True, 0.1)
+    for leaves, is_told in ((3.65, True), (1.2, False)):
+        _, said = named_conclusion(selection(0.9, leaves), gap)
+        assert ("keep an error of 1.9 floors" in said and "for this law only" in said) is is_told
+
+
 def with_hum(first, share):
     """The search that found hum beside creep, so that both explain a share of the gap."""
     (step,) = first.steps
