@@ -90,7 +90,8 @@ def truth_of(plant: Plant, model: Model) -> dict[str, float]:
             case "amplifier_bandwidth", tau:
                 found |= {"amplifier_bandwidth.tau": tau, "amplifier_bandwidth_held.tau": tau}
             case "amplifier_slew_limit", slew:
-                found["amplifier_slew_limit.S"] = slew * plant.volt
+                forms = ("amplifier_slew_limit", "amplifier_slew_limit_settling")
+                found |= {f"{form}.S": slew * plant.volt for form in forms}
             case "axis_coupling", kappa:
                 found["axis_coupling.kappa0"] = kappa
     return found

@@ -108,8 +108,8 @@ def named_conclusion(selection: Selection, gap: Gap) -> tuple[Conclusion, str]:
     said = f"The model does not contain {names}, which {explain} {100 * gap.explained:.0f} % of the gap; {rest}."
     if (excess := selection.score.excess) > ADEQUATE:
         said += (
-            f" The training records keep an error of {np.sqrt(excess):.1f} floors: the law of the effect may be another "
-            "one, and the intervals hold for this law only."
+            f" The training records keep an error of {np.sqrt(excess):.1f} floors: the law of an effect may differ, "
+            "and the intervals hold for this law only."
         )
     if not selection.in_time:
         said += MORE_MAY_BE_MISSING

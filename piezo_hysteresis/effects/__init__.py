@@ -26,6 +26,7 @@ from .drive.amplifier_bandwidth_held import AmplifierBandwidthHeld
 from .drive.amplifier_saturation import AmplifierSaturation
 from .drive.amplifier_slew_limit import AmplifierSlewLimit
 from .drive.amplifier_slew_limit_held import AmplifierSlewLimitHeld
+from .drive.amplifier_slew_limit_settling import AmplifierSlewLimitSettling
 from .drive.backlash import Backlash
 from .dynamics.arx import Arx
 from .dynamics.extra_delay import ExtraDelay
@@ -68,6 +69,7 @@ CHAIN: tuple[type[Effect], ...] = (
     AmplifierSaturation,
     AmplifierSlewLimit,
     AmplifierSlewLimitHeld,
+    AmplifierSlewLimitSettling,
     AmplifierBandwidth,
     AmplifierBandwidthHeld,
     Backlash,
@@ -115,6 +117,7 @@ BASELINE: tuple[type[Effect], ...] = (*OPERATORS.values(), Arx, Offset)
 
 FINER_FORMS: tuple[type[Effect], ...] = (
     AmplifierSlewLimitHeld,
+    AmplifierSlewLimitSettling,
     LevelDependentMemory,
     CreepTwoRates,
     SecondOrderLowPass,
@@ -159,6 +162,7 @@ __all__ = [
     "AmplifierSaturation",
     "AmplifierSlewLimit",
     "AmplifierSlewLimitHeld",
+    "AmplifierSlewLimitSettling",
     "Arx",
     "AsymmetricHysteresis",
     "AxisCoupling",

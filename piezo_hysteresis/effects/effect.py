@@ -224,8 +224,8 @@ class Effect(ABC):
         """
         return (cls(),)
 
-    def refined(self) -> Self | None:
-        """The same effect with the same output and more parameters to fit; None if there is no such form."""
+    def refined(self) -> Effect | None:
+        """The same effect with about the same output and more parameters to fit; None if there is no such form."""
         return None
 
     @abstractmethod

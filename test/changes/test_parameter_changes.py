@@ -119,6 +119,7 @@ def test_a_larger_loop_is_told_by_its_height_at_the_same_slope(model, another_da
     assert again.gain == pytest.approx(slope / old_slope - 1.0, abs=0.005)
 
 
+@pytest.mark.soak
 def test_an_amplifier_that_became_slower_is_found_with_its_size():
     stage = Nanopositioner(mode=310.0, filter_drive=1e-3)
     before = identify(played(stage), memory=True).model

@@ -54,6 +54,7 @@ N = 400
 UNUSUAL = {
     "amplifier_slew_limit": {"S": 2e3},
     "amplifier_slew_limit_held": {"S": 2e3, "late": 0.3},
+    "amplifier_slew_limit_settling": {"S": 2e3},
     "amplifier_saturation": {"lower": 1.4, "upper": 4.4},
 }
 """Sizes of effects that are not off at a finite small value."""

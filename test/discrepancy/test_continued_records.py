@@ -60,12 +60,16 @@ def test_a_lag_is_named_although_the_records_on_average_are_at_the_floor(tmp_pat
     assert found.gap.after < 1.1 * found.gap.floor
 
 
-def test_the_interval_of_a_largest_slope_contains_the_time_between_samples(tmp_path):
+def test_a_largest_slope_and_the_pole_of_its_amplifier_are_as_hidden(tmp_path):
+    """The slope without the pole left 1.6 floors, and its interval excluded the truth."""
     experiment, truth = simulated(tmp_path, 4)
     found = diagnose(experiment)
     assert found.names == ("amplifier_slew_limit",)
-    low, high = found.fit.interval("amplifier_slew_limit.S")
+    low, high = found.fit.interval("amplifier_slew_limit_settling.S")
     assert low < truth["electronics.amplifier_slew"] / GAIN < high
+    low, high = found.fit.interval("amplifier_slew_limit_settling.tau")
+    assert low < 1.0 / (2.0 * np.pi * CORNER) < high
+    assert found.gap.after < 1.1 * found.gap.floor
 
 
 def test_a_drift_is_named_beside_dynamics_that_could_imitate_it(tmp_path):

@@ -60,6 +60,7 @@ def test_nothing_is_missing_where_nothing_is_hidden(plant):
     assert found.gap.after <= 1.2 * found.gap.floor
 
 
+@pytest.mark.soak
 def test_a_rate_law_is_found_from_averages_and_not_left_in_a_local_minimum():
     """An average over the end of a ramp moves less than the ramp; the staircase holds 16 of them."""
     case = Case("effects", ("rate_dependent_hysteresis",), 2, 5e-4, layout=ProtocolVariant(hold=1.0))

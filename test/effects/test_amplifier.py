@@ -26,6 +26,7 @@ from piezo_hysteresis.effects import (
     AmplifierSaturation,
     AmplifierSlewLimit,
     AmplifierSlewLimitHeld,
+    AmplifierSlewLimitSettling,
     Discretisation,
     Effect,
 )
@@ -65,6 +66,32 @@ def test_a_held_slope_limit_gives_the_mean_of_the_ramps_in_every_period() -> Non
     means = ramps.reshape(-1, finer).mean(axis=1)
     assert np.abs(means - drive).max() > 1.0
     np.testing.assert_allclose(run(AmplifierSlewLimitHeld(S=slope), drive), means, atol=slope * PERIOD / finer)
+
+
+def test_an_amplifier_with_a_pole_and_a_largest_slope_follows_its_differential_equation() -> None:
+    """Explicit steps a thousandth as long as the period, of a drive that reaches the slope now and then."""
+    finer, slope, tau = 1000, 1e4, 3e-5
+    drive = 3.0 + np.cumsum(np.random.default_rng(6).normal(0.0, 0.3, 400))
+    drive[200:] += 2.0
+    y, expected = drive[0], []
+    for held in drive:
+        for _ in range(finer):
+            y += np.clip((held - y) / tau, -slope, slope) * PERIOD / finer
+        expected.append(y)
+    found = run(AmplifierSlewLimitSettling(S=slope, tau=tau), drive)
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+    in_series = (AmplifierSlewLimit(S=slope), AmplifierBandwidthHeld(tau=tau))
+    for first, second in (in_series, in_series[::-1]):
+        assert np.abs(run(second, run(first, drive)) - expected).max() > 0.03
+
+
+@settings(max_examples=40)
+@given(st.lists(st.floats(-10.0, 10.0), min_size=2, max_size=50), st.floats(1.0, 1e6), st.floats(1e-6, 1e-3))
+def test_without_a_pole_or_a_limit_it_is_the_other_one(x: list[float], slope: float, tau: float) -> None:
+    drive = np.array(x)
+    limit, pole = AmplifierSlewLimit(S=slope), AmplifierBandwidthHeld(tau=tau)
+    np.testing.assert_allclose(run(AmplifierSlewLimitSettling(S=slope), drive), run(limit, drive), atol=1e-12)
+    np.testing.assert_allclose(run(AmplifierSlewLimitSettling(tau=tau), drive), run(pole, drive), atol=1e-12)
 
 
 @pytest.mark.parametrize("ratio", [1, 3, 40])

@@ -84,6 +84,7 @@ def test_a_quiet_drive_is_nearer_to_the_true_one_and_its_step_stays(frequency, l
     assert np.std(held) < 0.3 * noise
 
 
+@pytest.mark.soak
 def test_identification_with_a_noisy_voltage_predicts_other_rates():
     stage = Nanopositioner(noise=2e-4)
     drives = {f: growing_sine(f, PERIOD, (0.4, 0.7, 1.0)) for f in (1.0, 10.0, 60.0)}

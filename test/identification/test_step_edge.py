@@ -62,6 +62,7 @@ def test_behind_a_largest_current_one_slow_rate_predicts_a_fast_one():
     assert lag_holds(found, stage, PERIOD)
 
 
+@pytest.mark.soak
 def test_the_edge_does_not_hide_the_ringing_of_a_step_in_its_own_record():
     """A mode that does not ring was assumed instead, and the step was predicted with 0.19 %."""
     stage = Nanopositioner.random(np.random.default_rng(0), mode=600.0, slew=3000.0)

@@ -149,9 +149,9 @@ def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
     """The candidate in its form with more parameters, if the data need it and it is better."""
     finer = candidate.effect.refined()
     gain = before.cost - candidate.score.cost
-    if finer is None or candidate.score.excess <= ADEQUATE or gain < LEAST_GAIN:
+    if finer is None or not leaves_room(candidate.score) or gain < LEAST_GAIN:
         return candidate
-    refined = refit(candidate.fit.model, replace(candidate, effect=finer), LATER)
+    refined = refit(candidate.fit.model.without(candidate.name), replace(candidate, effect=finer), LATER)
     if refined is None or refined.score.cost > candidate.score.cost - TIE:
         return candidate
     return settled(refined, before)

@@ -25,13 +25,13 @@ from ...blocks.held import HeldBlock
 from ...blocks.kernel import kernel
 from ...c_form import CForm
 from ...inverse_terms import InverseStart, InverseTerms
-from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..extent import Extent
 from ..invertibility import Invertibility
+from .amplifier_slew_limit_settling import SLOPE, UNLIMITED, AmplifierSlewLimitSettling
 
-UNLIMITED = 1e9
-"""Slope that is never reached [V/s]."""
+FINER_TAU = 1e-5
+"""Time constant with which the search for a settling amplifier starts [s]."""
 
 
 class AmplifierSlewLimit(Effect):
@@ -50,14 +50,16 @@ class AmplifierSlewLimit(Effect):
     equation = "|dy/dt| ≤ S = I_max/(C·gain)"
     signature = "Fast signals of large amplitude become triangles"
     source = "0.5 A into 20 µF: 25 V/ms after the amplifier"
-    parameters = (
-        Parameter("S", "S", "V/s", UNLIMITED, 1e-2, UNLIMITED, "largest slope of the drive", "I_max/C", UNLIMITED, 1e3),
-    )
+    parameters = (SLOPE,)
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         slopes = extent.max_slew / 2.0 ** np.arange(1.0, 12.0, 0.5)  # noise gives many local minima
         return tuple(cls(S=float(slope)) for slope in slopes if slope > extent.span)
+
+    def refined(self) -> AmplifierSlewLimitSettling:
+        """The limit of an amplifier with a small time constant; it needs one, as that of 0 has no influence."""
+        return AmplifierSlewLimitSettling(S=self["S"], tau=FINER_TAU)
 
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
         return AmplifierSlewLimitBlock(self["S"], setting.sample_period)

@@ -26,7 +26,7 @@ from ...inverse_terms import InverseStart, InverseTerms
 from ...parameter import Parameter
 from ..effect import ChainPosition, Discretisation, Effect
 from ..invertibility import Invertibility
-from .amplifier_slew_limit import UNLIMITED, AmplifierSlewLimit
+from .amplifier_slew_limit_settling import SLOPE, UNLIMITED
 
 
 class AmplifierSlewLimitHeld(Effect):
@@ -56,7 +56,7 @@ class AmplifierSlewLimitHeld(Effect):
     signature = "As for amplifier_slew_limit; slower motion is late by a time proportional to its speed"
     source = "mean of a ramp of slope S that ends at the held value: ℓ = 0.5"
     parameters = (
-        *AmplifierSlewLimit.parameters,
+        SLOPE,
         Parameter("late", "ℓ", "1", 0.5, 0.0, 0.5, "lateness of a ramp, in sample periods", "0.5 for its mean"),
     )
 

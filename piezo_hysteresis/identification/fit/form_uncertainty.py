@@ -28,6 +28,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...effects.effect import ChainPosition
 from ...record import Record
 from .covariance import sandwich
 from .fit import Fit, gauge
@@ -38,7 +39,7 @@ Array = NDArray[np.float64]
 ADEQUACY = 3e-4
 """Adequacy floor: error that counts as perfect, as a share of the range of the experiment."""
 LAG = "lag"
-"""Family of the effects that delay."""
+"""Family of the effects that delay, beside those that act on the drive."""
 PIECES = 16.0
 """Number of independent pieces of the structured misfit in one record: longer records do not make intervals smaller.
 
@@ -90,7 +91,7 @@ def with_form_uncertainty(
             bread += weight * inner
             meat += weight**2 * misfit * gram.size / PIECES * inner
     covariance = fit.covariance + sandwich(bread, meat, directions)
-    lags = {e.name for e in fit.model.effects if e.family == LAG}
+    lags = {e.name for e in fit.model.effects if e.family == LAG or e.place is ChainPosition.DRIVE}
     fitted = [r for r, floor in zip(records, floors, strict=True) if np.isfinite(floor)]
     for at, (name, value) in enumerate(fit.values.items()):
         unit = fit.model.row(name).unit
