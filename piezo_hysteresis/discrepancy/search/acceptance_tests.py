@@ -45,7 +45,7 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
     alone = without(best)
     owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
     if owed < LEAST_GAIN:
-        gains = f"gains only {owed:.2f}" if owed >= SHOWN else "gains nothing"
+        gains = f"gains only {owed:.2g} of the {LEAST_GAIN:g} that are needed" if owed >= SHOWN else "gains nothing"
         return Rejection(best.name, f"it {gains} over the model that was refitted without it")
     return None
 
