@@ -124,9 +124,10 @@ def unnamed_conclusion(selection: Selection, falls: bool, gap: Gap) -> tuple[Con
     """
     if not selection.in_time:
         return Conclusion.TIME_LIMIT, "No effect is named: the time limit ended the search before an answer was found."
-    many = gap.unseen and len(gap.per_phase) >= FEWEST_RECORDS
-    is_adequate = many and gap.after <= TEST_ADEQUATE * gap.floor and selection.score.excess <= 2.0 * ADEQUATE
-    if not selection.accepted and (is_adequate or selection.score.excess <= ADEQUATE):
+    start = selection.steps[0].before if selection.steps else selection.score
+    many = gap.unseen and len(gap.per_phase) >= FEWEST_RECORDS and not selection.accepted
+    is_adequate = many and gap.after <= TEST_ADEQUATE * gap.floor and start.excess <= 2.0 * ADEQUATE
+    if is_adequate or start.excess <= ADEQUATE:
         if gap.after > TEST_INADEQUATE * gap.floor:
             times = f"the error on the test records is {gap.after / gap.floor:.1f} times the noise floor"
             said = f"No effect is named: the training records show no missing effect, but {times}."

@@ -116,6 +116,14 @@ def test_a_limit_that_is_never_reached_has_no_interval():
     assert "-1e+09 V (not determined)" in diagnosis.summary()
 
 
+def test_nothing_is_missing_at_the_floor_although_an_effect_explains_a_small_part_of_the_error():
+    gap = Gap(0.11, 0.11, 0.1, None, (PhaseGap("triangle", 0, 0.11, 0.11, 0.1),), True, 0.11)
+    for first, expected in ((1.4, Conclusion.NOTHING_MISSING), (1.8, Conclusion.UNEXPLAINED_GAP)):
+        found = selection(0.4, 1.0 + (first - 1.0) * 0.6**2)
+        assert found.steps[0].before.excess == pytest.approx(first)
+        assert unnamed_conclusion(found, True, gap)[0] is expected
+
+
 def test_the_closest_answer_is_all_that_was_added():
     """Of two effects that explain 50 % together, only the first was stated, with its 40 %."""
     second = with_hum(selection(0.4, 50.0), 0.5)
