@@ -19,6 +19,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, leaves_room
 from piezo_hysteresis.discrepancy.search.selection import select
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, explained
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
@@ -39,8 +40,17 @@ def test_explained_stays_between_nothing_and_all():
     assert explained(0.9, 0.9, 1.0) == 1.0
 
 
-def test_nothing_is_tried_on_a_model_that_is_adequate():
-    score = Score(np.sqrt(np.full(5, ADEQUATE)), np.empty(0))
+def test_nothing_is_tried_where_no_effect_can_gain_enough():
+    score = Score(np.sqrt(np.exp(np.full(5, 0.99 * LEAST_GAIN))), np.empty(0))
     found = select(None, TrainingData((), np.ones(1), None, None), score)
     assert isinstance(found, Selection)
     assert found.steps == found.accepted == ()
+
+
+def test_a_lag_in_a_few_records_leaves_room_although_their_mean_is_at_the_floor():
+    """Slow records whose noise is below their floor; V alone ended the search."""
+    ratios = np.sqrt(np.array([0.2] * 12 + [2.4] * 6))
+    score = Score(ratios, np.empty(0))
+    assert score.excess < ADEQUATE
+    assert leaves_room(score)
+    assert not leaves_room(Score(np.minimum(ratios, 1.0), np.empty(0)))
