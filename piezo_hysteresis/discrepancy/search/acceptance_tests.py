@@ -17,9 +17,12 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import chdtri
 
 from ...effects import AmplifierSaturation, MainsHum
 from ...identification.fit.cross_validation import Score
+from ...identification.fit.form_uncertainty import with_form_uncertainty
+from ...identification.records.noise_floor import ADEQUATE, stroke
 from .candidate_refits import LEAST_GAIN
 from .candidates import FittedCandidate
 from .refit import without
@@ -32,6 +35,8 @@ PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
 """Smallest number of mains periods in a record, longest sample period in mains periods, smallest number of records."""
 STEADY = 0.3
 """Smallest ratio of the quartiles of the amplitude of hum."""
+UNCERTAIN = 0.05
+"""Probability of a size at least as large without the effect, up to which the effect is certain."""
 
 
 def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
@@ -47,7 +52,28 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
     if owed < LEAST_GAIN:
         gains = f"gains only {owed:.2g} of the {LEAST_GAIN:g} that are needed" if owed >= SHOWN else "gains nothing"
         return Rejection(best.name, f"it {gains} over the model that was refitted without it")
+    if before.excess <= ADEQUATE and not is_certain(best):
+        return Rejection(best.name, "the error is at the floor, and the interval of its size includes none")
     return None
+
+
+def is_certain(candidate: FittedCandidate) -> bool:
+    """Whether the size of an effect differs from none by more than the uncertainty of the model's form.
+
+    A Wald test of all its numbers that are known when the effect is off; hum, which is free in every record, has none.
+    """
+    data, model = candidate.training_data, candidate.fit.model
+    noise = data.floors if data.noise is None else data.noise
+    free, span = data.free_with(model), stroke(data.records)
+    fit = with_form_uncertainty(candidate.fit, data.records, free, data.floors, noise, span)
+    now, off = fit.values, model.with_effect(candidate.effect.off()).values()
+    own = [n for n in fit.names if n.partition(".")[0] == candidate.name and model.row(n).off is not None]
+    sizes = [n for n in own if fit.standard_errors[n] > 0.0]
+    if not sizes:
+        return True
+    away = np.array([(now[n] - off[n]) / fit.standard_errors[n] for n in sizes])
+    likeness = np.array([[fit.correlation(n, m) for m in sizes] for n in sizes])
+    return bool(away @ np.linalg.pinv(likeness, hermitian=True) @ away > chdtri(len(sizes), UNCERTAIN))
 
 
 def is_steady(hum: FittedCandidate) -> bool:
