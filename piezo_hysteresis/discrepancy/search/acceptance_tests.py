@@ -53,7 +53,7 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
         gains = f"gains only {owed:.2g} of the {LEAST_GAIN:g} that are needed" if owed >= SHOWN else "gains nothing"
         return Rejection(best.name, f"it {gains} over the model that was refitted without it")
     if before.excess <= ADEQUATE and not is_certain(best):
-        return Rejection(best.name, "the error is at the floor, and the interval of its size includes none")
+        return Rejection(best.name, "the error is at the floor, and its interval does not exclude that it is absent")
     return None
 
 
