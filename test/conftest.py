@@ -18,9 +18,9 @@ Tests that start nodes wait most of their time. Three such files at once take le
 beside a test that computes. Files that open an emulated device, whose lock one process at a time may have, stay in one
 process, and so do those that open a browser, which draws with the processor.
 
-Tests of real processes over DDS need the processor in time. One that fails is tried once more, and reported as RERUN: a
-promise that does not hold fails twice, a computer that was busy elsewhere does not. Nor does it fail a property: no
-example has a deadline.
+Tests of real processes over DDS, or of a device that a keeper makes safe when its driver is late, need the processor in
+time. One that fails is tried once more, and reported as RERUN: a promise that does not hold fails twice, a computer
+that was busy elsewhere does not. Nor does it fail a property: no example has a deadline.
 
 A shell starts a background job with SIGINT ignored, and nohup its command with SIGHUP ignored, and every process below
 inherits that. Tests that send these signals need them to arrive.
@@ -51,5 +51,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         browser = item.path.parent.name == "page"
         group = "devices" if device else "browsers" if browser else item.path.stem
         item.add_marker(pytest.mark.xdist_group(group))
-        if nodes:
+        if nodes or device:
             item.add_marker(pytest.mark.flaky(reruns=1))
