@@ -27,6 +27,8 @@ class HeldBlock(Block):
     """State [y]. At rest the output equals the input, for any value of the parameter."""
 
     keeps_state = True
+    remembered = 1
+    """Number of parameters, from the first one on, by which the state has a derivative."""
 
     @abstractmethod
     def follow(self, x: Array, state: State, y: Array) -> None:
@@ -34,10 +36,7 @@ class HeldBlock(Block):
 
     @abstractmethod
     def follow_tangent(self, x: Array, dx: Array, state: State, tangent: State, y: Array, dy: Array) -> None:
-        """`follow`, with rows dx (m, n) to dy (m + p, n) for p parameters; `tangent` (m + 1,) is updated.
-
-        Only the first parameter has a memory.
-        """
+        """`follow`, with rows dx (m, n) to dy (m + p, n) for p parameters; `tangent` (m + remembered,) is updated."""
 
     def static(self, x0: float) -> float:
         return x0
@@ -54,7 +53,7 @@ class HeldBlock(Block):
         return y, state
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
-        return np.append(dx0, 0.0)
+        return np.append(dx0, np.zeros(self.remembered))
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         y, state, tangent = np.empty_like(x), state.copy(), tangent.copy()

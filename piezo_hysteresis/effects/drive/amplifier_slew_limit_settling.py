@@ -136,6 +136,7 @@ class AmplifierSlewLimitSettlingBlock(HeldBlock):
     """y_i = x_i + g, where g is what `settle` leaves of the distance y_(i−1) − x_i."""
 
     names = ("amplifier_slew_limit_settling.S", "amplifier_slew_limit_settling.tau")
+    remembered = 2
 
     def __init__(self, slope: float, tau: float, sample_period: float) -> None:
         self.slope = slope if slope < UNLIMITED else np.inf
@@ -143,9 +144,6 @@ class AmplifierSlewLimitSettlingBlock(HeldBlock):
 
     def follow(self, x: Array, state: State, y: Array) -> None:
         run_settling(x, self.slope, self.tau, self.sample_period, state, y)
-
-    def rest_tangent(self, x0: float, dx0: Array) -> State:
-        return np.append(dx0, [0.0, 0.0])
 
     def follow_tangent(self, x: Array, dx: Array, state: State, tangent: State, y: Array, dy: Array) -> None:
         linearise_settling(x, dx, self.slope, self.tau, self.sample_period, state, tangent, y, dy)
