@@ -78,7 +78,8 @@ def truth_of(plant: Plant, model: Model) -> dict[str, float]:
             case "rate_dependent_hysteresis", (k, a):
                 speed = shrink**-a
                 k = k * speed / (1.0 + k / a * (speed - 1.0))
-                found |= {"rate_dependent_hysteresis.k": k, "rate_dependent_hysteresis.a": a}
+                for form in ("rate_dependent_hysteresis", "rate_dependent_hysteresis_lagged"):
+                    found |= {f"{form}.k": k, f"{form}.a": a}
             case "extra_resonance", (frequency, zeta, _):
                 found |= {"extra_resonance.f0": frequency, "extra_resonance.zeta": zeta}
             case "hysteresis_exponent", n:

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from math import copysign
 
-from ..blocks.bouc_wen_kernel import BETA, GAMMA, A, general_step, plain_step
+from ..blocks.bouc_wen.bouc_wen_kernel import BETA, GAMMA, A, general_step, plain_step
 from ..blocks.kernel import fma, inlined
 from ..effects.hysteresis.level_density import level_density, level_value
 from ..effects.hysteresis.published_bouc_wen import step as published_step

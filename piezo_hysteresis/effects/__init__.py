@@ -49,6 +49,7 @@ from .hysteresis.level_dependent_memory import LevelDependentMemory
 from .hysteresis.operator import HysteresisOperator, Loop
 from .hysteresis.published_bouc_wen import PublishedBoucWen
 from .hysteresis.rate_dependent_hysteresis import RateDependentHysteresis
+from .hysteresis.rate_dependent_hysteresis_lagged import RateDependentHysteresisLagged
 from .invertibility import Invertibility
 from .material import LAWS_OF_CREEP
 from .material.creep import Creep
@@ -78,6 +79,7 @@ CHAIN: tuple[type[Effect], ...] = (
     AsymmetricHysteresis,
     HysteresisExponent,
     RateDependentHysteresis,
+    RateDependentHysteresisLagged,
     InitialState,
     HysteresisMemory,
     LevelDependentMemory,
@@ -118,6 +120,7 @@ BASELINE: tuple[type[Effect], ...] = (*OPERATORS.values(), Arx, Offset)
 FINER_FORMS: tuple[type[Effect], ...] = (
     AmplifierSlewLimitHeld,
     AmplifierSlewLimitSettling,
+    RateDependentHysteresisLagged,
     LevelDependentMemory,
     CreepTwoRates,
     SecondOrderLowPass,
@@ -190,6 +193,7 @@ __all__ = [
     "ChainPosition",
     "PublishedBoucWen",
     "RateDependentHysteresis",
+    "RateDependentHysteresisLagged",
     "SecondOrderLowPass",
     "SensorBandwidth",
     "SensorNonlinearity",

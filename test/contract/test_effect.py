@@ -42,6 +42,7 @@ from piezo_hysteresis.effects import (
     Offset,
     PublishedBoucWen,
     RateDependentHysteresis,
+    RateDependentHysteresisLagged,
     Softening,
     SofteningOfOneMode,
     ThermalDrift,
@@ -55,11 +56,12 @@ UNUSUAL = {
     "amplifier_slew_limit": {"S": 2e3},
     "amplifier_slew_limit_held": {"S": 2e3, "late": 0.3},
     "amplifier_slew_limit_settling": {"S": 2e3},
+    "rate_dependent_hysteresis_lagged": {"tau": 3e-4},
     "amplifier_saturation": {"lower": 1.4, "upper": 4.4},
 }
 """Sizes of effects that are not off at a finite small value."""
 
-NORMALISED = (RateDependentHysteresis, HysteresisExponent)
+NORMALISED = (RateDependentHysteresis, RateDependentHysteresisLagged, HysteresisExponent)
 """Their reference speed or state is one of the normalised drive, so that they depend on its scale."""
 
 MAY_DIVERGE = (PublishedBoucWen, Softening, SofteningOfOneMode)

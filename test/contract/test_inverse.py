@@ -58,6 +58,7 @@ TYPICAL: dict[str, dict[str, float]] = {
     "amplifier_slew_limit_settling": {"S": 1e5, "tau": 1e-5},
     "amplifier_saturation": {"lower": -3.0, "upper": 4.4, "corner": 0.5},
     "rate_dependent_hysteresis": {"k": 0.01, "a": 0.1},
+    "rate_dependent_hysteresis_lagged": {"k": 0.01, "a": 0.1, "tau": 2e-4},
     "arx": {},
 }
 
@@ -65,6 +66,7 @@ APPROXIMATED = {
     "extra_delay": ("tau", (1e-5, 3e-5, 1e-3), 1e-4),
     "amplifier_slew_limit_held": ("S", (1e4, 3e4, 1e5), 3e-3),
     "amplifier_slew_limit_settling": ("S", (1e4, 3e4, 1e5), 3e-3),
+    "rate_dependent_hysteresis_lagged": ("tau", (2e-5, 2e-4, 2e-3), 3e-3),
 }
 """Sizes of effects that are inverted with an error, and its largest share of the range."""
 

@@ -22,6 +22,7 @@ import pytest
 from piezo_hysteresis.cli.main import main
 from piezo_hysteresis.discrepancy import diagnose
 from piezo_hysteresis.recording import read
+from piezo_hysteresis.stage.plant.hysteresis import Hysteresis
 
 pytestmark = pytest.mark.soak
 CORNER = 10e3
@@ -70,6 +71,19 @@ def test_a_largest_slope_and_the_pole_of_its_amplifier_are_as_hidden(tmp_path):
     low, high = found.fit.interval("amplifier_slew_limit_settling.tau")
     assert low < 1.0 / (2.0 * np.pi * CORNER) < high
     assert found.gap.after < 1.1 * found.gap.floor
+
+
+def test_a_loop_that_follows_the_speed_late_is_as_hidden(tmp_path):
+    """Without the lag, 1.9 floors were left, and the interval of the exponent excluded the truth."""
+    experiment, truth = simulated(tmp_path, 24)
+    found = diagnose(experiment)
+    assert found.names == ("rate_dependent_hysteresis",)
+    stage = Hysteresis()
+    hidden = {"k": truth["hysteresis.rate_gain"], "a": stage.rate_exponent, "tau": stage.rate_time}
+    for name, value in hidden.items():
+        low, high = found.fit.interval(f"rate_dependent_hysteresis_lagged.{name}")
+        assert low < value < high
+    assert found.gap.after < 1.2 * found.gap.floor
 
 
 def test_a_drift_is_named_beside_dynamics_that_could_imitate_it(tmp_path):

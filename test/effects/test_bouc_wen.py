@@ -22,7 +22,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from piezo_hysteresis.blocks.bouc_wen_kernel import run_general, run_plain
+from piezo_hysteresis.blocks.bouc_wen.bouc_wen_kernel import run_general, run_plain
 from piezo_hysteresis.effects import (
     AsymmetricHysteresis,
     BoucWen,
@@ -31,6 +31,7 @@ from piezo_hysteresis.effects import (
     InitialState,
     PublishedBoucWen,
     RateDependentHysteresis,
+    RateDependentHysteresisLagged,
     Term,
 )
 from piezo_hysteresis.errors import ModelError, ParameterError
@@ -115,6 +116,50 @@ def test_rate_law_is_continuous_at_the_logarithm() -> None:
     v = np.sin(np.arange(200) / 10.0)
     near = state_of(v, RateDependentHysteresis(k=0.05, a=1e-7), **VALUES)
     np.testing.assert_allclose(state_of(v, RateDependentHysteresis(k=0.05, a=0.0), **VALUES), near, atol=1e-7)
+
+
+@pytest.mark.parametrize("tau", [2e-4, 3e-3])
+@pytest.mark.parametrize("steps", [40, 400])
+def test_a_lag_of_the_speed_solves_its_equation(tau: float, steps: int) -> None:
+    k, a, piece = 0.05, 0.2, 4e-3
+
+    def slopes(t, y, speed):
+        h, q = y
+        factor = 1.0 + k * (np.maximum(q, 1e-4) ** a - 1.0) / a
+        loss = VALUES["beta"] * abs(speed) * h + VALUES["gamma"] * speed * abs(h)
+        return VALUES["A"] * factor * speed - loss, (abs(speed) - q) / tau
+
+    state, expected = (0.0, 0.0), [0.0]
+    for start, end in zip(TURNS[:-1], TURNS[1:], strict=True):
+        speed = (end - start) / piece
+        fine = {"rtol": 1e-9, "atol": 1e-12, "max_step": piece / 300}
+        state = solve_ivp(slopes, (0.0, piece), state, args=(speed,), **fine).y[:, -1]
+        expected.append(state[0])
+    setting = Discretisation(piece / steps, piece / steps)
+    terms = (RateDependentHysteresisLagged(k=k, a=a, tau=tau),)
+    block = BoucWen(p1=0.0, p2=0.0, **VALUES).block(setting, terms)
+    got = block.run(polyline(TURNS, steps), block.rest(0.0, 0.0))[0][::steps]
+    np.testing.assert_allclose(got, expected, atol=0.1 * k / steps)
+
+
+def test_without_a_lag_the_speed_acts_at_once() -> None:
+    v, law = polyline(TURNS, 30), {"k": 0.05, "a": 0.2}
+    at_once = state_of(v, RateDependentHysteresis(**law), **VALUES)
+    np.testing.assert_array_equal(state_of(v, RateDependentHysteresisLagged(**law), **VALUES), at_once)
+    soon = state_of(v, RateDependentHysteresisLagged(**law, tau=1e-9), **VALUES)
+    np.testing.assert_allclose(soon, at_once, atol=1e-7)
+
+
+def test_a_jump_of_a_slow_record_decays_for_the_rest_of_its_sample() -> None:
+    slow, law = Discretisation(4e-3, 1e-4), {"k": 0.05, "a": 0.2, "tau": 1e-3}
+    terms = (RateDependentHysteresisLagged(**law),)
+    ways = []
+    for setting, drive in ((slow, np.array([0.0, 0.4, 0.42])), (Discretisation(1e-4, 1e-4), np.zeros(81))):
+        if setting is not slow:
+            drive[1:] = np.concatenate((np.full(40, 0.4), 0.4 + 0.02 * np.arange(1, 41) / 40))
+        block = BoucWen(p1=0.0, p2=0.0, **VALUES).block(setting, terms)
+        ways.append(block.run(drive, block.rest(0.0, 0.0))[0][-1])
+    assert ways[0] == pytest.approx(ways[1], abs=1e-5)
 
 
 def test_a_remanent_state_is_present_at_rest_and_lost_after_a_swing() -> None:

@@ -22,8 +22,18 @@ from typing import Self
 import numpy as np
 
 from ...blocks.block import Array, Block, State
-from ...blocks.bouc_wen_kernel import ADVANCE_IN_C, GENERAL_IN_C, LOOP, LOOP_OFF, PLAIN_IN_C, run_general, run_plain
-from ...blocks.bouc_wen_sensitivities import START, linearise_general, linearise_plain
+from ...blocks.bouc_wen.bouc_wen_kernel import (
+    ADVANCE_IN_C,
+    GENERAL_IN_C,
+    LOOP,
+    LOOP_OFF,
+    PLAIN_IN_C,
+    STEP_AT_SPEED_IN_C,
+    run_general,
+    run_plain,
+)
+from ...blocks.bouc_wen.bouc_wen_sensitivities import START, linearise_general, linearise_plain
+from ...blocks.bouc_wen.speed_lag import FADE, LAGGED_STEP, LEFT, SHARE, run_lagged, speed_lag
 from ...c_form import CForm, Number
 from ...errors import ParameterError
 from ...inverse_terms import GENERAL, PLAIN, InverseStart, InverseTerms, LoopTerms
@@ -153,8 +163,12 @@ class BoucWen(ModifiedBoucWen):
         return BoucWenBlock(self, setting, terms)
 
 
+OWN = (*LOOP, "h0", "tau")
+"""Numbers of the loop and its terms, each with its index in the sensitivities."""
+
+
 class BoucWenBlock(Block):
-    """The loop with its terms; state [h, v_last]."""
+    """The loop with its terms; state [h, v_last, q] with the lagged speed q, which is 0 without a lag."""
 
     keeps_state = True
 
@@ -162,19 +176,22 @@ class BoucWenBlock(Block):
         self.sample_period, self.jump_period = setting.sample_period, setting.model_period
         self.p1, self.p2 = effect["p1"], effect["p2"]
         self.loop = LOOP_OFF.copy()
-        self.start = 0.0
+        self.start = self.tau = 0.0
         owners = dict.fromkeys(("A", "beta", "gamma"), effect.name)
         for term in terms:
-            owners |= {name: term.name for name in term.values if name in LOOP or name == "h0"}
+            owners |= {name: term.name for name in term.values if name in OWN}
         for member in (effect, *terms):
             for name in member.values:
                 if name in LOOP:
                     self.loop[LOOP.index(name)] = member[name]
                 elif name == "h0":
                     self.start = member[name]
+                elif name == "tau":
+                    self.tau = member[name]
                 elif name == "jumps" and not member[name]:
                     self.jump_period = setting.sample_period
-        self.own = np.array([LOOP.index(n) if n in LOOP else START for n in owners], dtype=np.int64)
+        self.own = np.array([OWN.index(n) for n in owners], dtype=np.int64)
+        self.lag = speed_lag(self.tau, self.sample_period, self.jump_period)
         self.names = (*(f"{owner}.{n}" for n, owner in owners.items()), f"{effect.name}.p1", f"{effect.name}.p2")
         self.is_plain = bool(np.array_equal(self.loop[3:7], LOOP_OFF[3:7]))
 
@@ -185,50 +202,62 @@ class BoucWenBlock(Block):
         return 3.0 * self.p1 * x0 * x0 + self.p2, np.append(self.own == START, [x0**3, x0])
 
     def rest(self, x0: float, time: float) -> State:
-        return np.array([self.start, x0])
+        return np.array([self.start, x0, 0.0])
 
     def run(self, x: Array, state: State) -> tuple[Array, State]:
         w, state = np.empty_like(x), state.copy()
+        chosen = self.loop, self.p1, self.p2
         if self.is_plain:
-            run_plain(x, self.loop, self.p1, self.p2, state, w)
+            run_plain(x, *chosen, state, w)
+        elif self.tau:
+            run_lagged(x, *chosen, self.sample_period, self.jump_period, self.lag, state, w)
         else:
-            run_general(x, self.loop, self.p1, self.p2, self.sample_period, self.jump_period, state, w)
+            run_general(x, *chosen, self.sample_period, self.jump_period, state, w)
         return w, state
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
-        return np.append(np.zeros(len(dx0)), self.own == START), np.array(dx0)
+        return np.append(np.zeros(len(dx0)), self.own == START), np.array(dx0), np.zeros(len(dx0) + self.own.size)
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         w, state = np.empty_like(x), state.copy()
-        slopes, last = tangent[0].copy(), tangent[1].copy()
+        slopes, last, lagged = (part.copy() for part in tangent)
         rows = np.empty((len(slopes) + 2, x.size))
         chosen = self.loop, self.p1, self.p2
         if self.is_plain and self.own.size == 3 and not len(dx):
             linearise_plain(x, *chosen, state, slopes, w, rows)
         else:
             periods = self.sample_period, self.jump_period
-            linearise_general(x, dx, *chosen, self.own, *periods, state, slopes, last, w, rows)
-        return w, rows, state, (slopes, last)
+            linearise_general(x, dx, *chosen, self.own, periods, self.lag, state, slopes, last, lagged, w, rows)
+        return w, rows, state, (slopes, last, lagged)
 
     def c_form(self) -> CForm:
         numbers: dict[str, Number] = {"p1": self.p1, "p2": self.p2, "h0": self.start}
-        if self.is_plain:
-            loop, call = PLAIN_IN_C, "plain_step(s->h, dv, A, beta, gamma)"
-            numbers |= dict(zip(LOOP[:3], self.loop.tolist(), strict=False))
-        else:
-            loop, call = GENERAL_IN_C, "general_step(s->h, dv, loop, period, jump_period)"
-            numbers |= {"loop": self.loop, "period": self.sample_period, "jump_period": self.jump_period}
         step = (
-            f"const double dv = x - s->v;\nif (dv != 0.0) {{\n    s->v = x;\n    s->h = {call};\n}}\n"
+            "const double dv = x - s->v;\nif (dv != 0.0) {{\n    s->v = x;\n    s->h = {};\n}}\n"
             "return p1 * x * x * x + p2 * x + s->h;"
         )
-        rest = "s->h = h0;\ns->v = x;\nreturn p1 * x * x * x + p2 * x + h0;"
-        return CForm(step, rest, numbers, ("double h, v",), (ADVANCE_IN_C, loop))
+        library = self.library
+        if self.is_plain:
+            step = step.format("plain_step(s->h, dv, A, beta, gamma)")
+            numbers |= dict(zip(LOOP[:3], self.loop.tolist(), strict=False))
+        else:
+            step = step.format("general_step(s->h, dv, loop, period, jump_period)")
+            numbers |= {"loop": self.loop, "period": self.sample_period, "jump_period": self.jump_period}
+            if self.tau:
+                step, library = LAGGED_STEP, (ADVANCE_IN_C, STEP_AT_SPEED_IN_C)
+                numbers |= {"fade": self.lag[:, FADE], "share": self.lag[:, SHARE], "left": self.lag[:, LEFT]}
+        rest = "s->h = h0;\ns->v = x;\ns->q = 0.0;\nreturn p1 * x * x * x + p2 * x + h0;"
+        return CForm(step, rest, numbers, ("double h, v, q",), library)
+
+    @property
+    def library(self) -> tuple[str, ...]:
+        """C functions of the step, without a lag of the speed."""
+        return ADVANCE_IN_C, *((PLAIN_IN_C,) if self.is_plain else (STEP_AT_SPEED_IN_C, GENERAL_IN_C))
 
     def inverse_terms(self) -> InverseTerms:
+        """The loop without the lag of the speed, which the recursion does not know."""
         periods = self.sample_period, self.jump_period
-        library = ADVANCE_IN_C, PLAIN_IN_C if self.is_plain else GENERAL_IN_C
-        loop = LoopTerms(PLAIN if self.is_plain else GENERAL, self.loop, periods, self.start, library)
+        loop = LoopTerms(PLAIN if self.is_plain else GENERAL, self.loop, periods, self.start, self.library)
         return InverseTerms(polynomial={"p1": self.p1, "p2": self.p2}, loop=loop)
 
     def inverse_start(self, x: float, state: State) -> InverseStart:

@@ -31,7 +31,7 @@ import numpy as np
 import scipy
 
 from ...blocks.block import Array
-from ...blocks.bouc_wen_kernel import LOOP_OFF, run_plain
+from ...blocks.bouc_wen.bouc_wen_kernel import LOOP_OFF, run_plain
 from .operator import POINTS, Loop, range_of, thinned
 
 LOSSES = np.geomspace(0.3, 100.0, 14)

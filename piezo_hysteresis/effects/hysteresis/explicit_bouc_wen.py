@@ -23,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...blocks.block import Array, Block, State
-from ...blocks.bouc_wen_kernel import (
+from ...blocks.bouc_wen.bouc_wen_kernel import (
     BETA,
     EXPONENT,
     GAMMA,

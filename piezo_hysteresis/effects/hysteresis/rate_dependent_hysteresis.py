@@ -18,13 +18,15 @@ from __future__ import annotations
 
 from typing import Self
 
-from ...parameter import Parameter
 from ..effect import ChainPosition, Term
 from ..extent import Extent
 from ..invertibility import Invertibility
+from .rate_dependent_hysteresis_lagged import RATE_LAW, RateDependentHysteresisLagged
 
 START_VALUES = (-0.03, 0.03)
 """Start values of k."""
+LAG = 1e-4
+"""Time constant with which the search for a lag of the speed starts [s]."""
 
 
 class RateDependentHysteresis(Term):
@@ -58,15 +60,7 @@ class RateDependentHysteresis(Term):
         "records fall on one curve"
     )
     source = "Al Janaideh et al. 2011, rate-dependent Prandtl-Ishlinskii; here on A of paper, Eq. (2)"
-    parameters = (
-        Parameter("k", "k", "1", 0.0, -0.5, 0.5, "change of loop slope with speed", "Al Janaideh 2011", 0.0, 0.05),
-        Parameter(
-            "a", "a", "1", 0.5, -0.5, 1.0, "exponent of the rate law; 0 is logarithmic", "Al Janaideh 2011", scale=0.3
-        ),
-        Parameter(
-            "jumps", "f_j", "1", 1.0, 0.0, 1.0, "change within a slow sample: 1 jump, 0 ramp", "sampling", fixed=True
-        ),
-    )
+    parameters = RATE_LAW
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
@@ -74,3 +68,7 @@ class RateDependentHysteresis(Term):
         off = tuple(cls(a=a, jumps=jumps) for jumps in (0.0, 1.0) for a in (0.5, 0.1))
         sizes = ((k, a) for k in START_VALUES for a in (0.3, 0.1, -0.1))
         return off + tuple(cls(k=k, a=a, jumps=jumps) for k, a in sizes for jumps in (0.0, 1.0))
+
+    def refined(self) -> RateDependentHysteresisLagged:
+        """The law with a lag of the speed."""
+        return RateDependentHysteresisLagged(**self.values, tau=LAG)

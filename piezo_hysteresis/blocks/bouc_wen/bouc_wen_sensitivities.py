@@ -20,6 +20,7 @@ from math import copysign, exp, log
 
 import numpy as np
 
+from ..kernel import inlined, kernel
 from .bouc_wen_kernel import (
     BETA,
     EXPONENT,
@@ -39,10 +40,10 @@ from .bouc_wen_kernel import (
     rate_factor,
     sub_steps,
 )
-from .kernel import inlined, kernel
+from .speed_lag import FADE, LEFT, SHARE, lagged_slopes
 
-START = len(LOOP)
-"""Index of the initial state in the own rows; it has no forcing term."""
+START, LAG = len(LOOP), len(LOOP) + 1
+"""Indices in the own rows of the initial state, which has no forcing term, and of the lag of the speed."""
 
 
 @kernel
@@ -73,15 +74,15 @@ def advance_slopes(h, drive, length, r_same, r_flipped):
 
 
 @kernel
-def slope_at(h, p, s):
-    """∂h/∂v at the beginning of a motion in direction s."""
+def slope_at(h, p, s, speed):
+    """∂h/∂v at the beginning of a motion in direction s, at a speed of the rate law."""
     g = copysign(1.0, s if h == 0.0 else h)
     loss = p[BETA] + p[GAMMA] * s * g
     if p[EXPONENT] != 1.0:
         loss *= abs(h / H_REFERENCE) ** (p[EXPONENT] - 1.0)
     drive = p[A]
     if p[RATE] != 0.0:
-        drive *= 1.0 + p[RATE] * rate_factor(0.0, p[RATE_EXPONENT])
+        drive *= 1.0 + p[RATE] * rate_factor(speed, p[RATE_EXPONENT])
     return drive - s * (loss - p[PHI1] * s - p[PHI2] * g) * h
 
 
@@ -113,19 +114,21 @@ def linearise_plain(v, p, p1, p2, state, tangent, w, dw):
 
 
 @kernel
-def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, state, tangent, last_in, w, dw):
-    """`run_general` with sensitivities.
+def linearise_general(v, dv_in, p, p1, p2, own, periods, lag, state, tangent, last_in, lagged_by, w, dw):
+    """`run_general` or `run_lagged` with sensitivities.
 
-    dv_in (m, n) are incoming rows; own (q,) are the indices of the own rows in `LOOP`, or `START`; tangent (m + q,) is
-    ∂h, last_in (m,) are the incoming sensitivities of v_last; dw (m + q + 2, n) is filled, with p1 and p2 last. While v
-    is constant, a changing row counts as motion in its direction: the derivative for a growing parameter.
+    dv_in (m, n) are incoming rows; own (q,) are the indices of the own rows in `LOOP`, `START` or `LAG`; `periods` are
+    those of a step and of a jump; tangent (m + q,) is ∂h, last_in (m,) are the incoming sensitivities of v_last, and
+    lagged_by (m + q,) those of the lagged speed; dw (m + q + 2, n) is filled, with p1 and p2 last. While v is constant,
+    a changing row counts as motion in its direction: the derivative for a growing parameter.
     """
     m, q = dv_in.shape[0], own.size
     n, k = p[EXPONENT], p[RATE]
-    h, last = state[0], state[1]
-    drive_by = np.zeros(START + 1)
-    same_by = np.zeros(START + 1)
-    flipped_by = np.zeros(START + 1)
+    h, last, lagged, speed = state[0], state[1], state[2], 0.0
+    speed_by = np.zeros(m + q)
+    drive_by = np.zeros(LAG + 1)
+    same_by = np.zeros(LAG + 1)
+    flipped_by = np.zeros(LAG + 1)
     half = (0.0, 0.0, 0.0, 0.0, 0.0)
     rated, powered = k != 0.0, n != 1.0
     for c in own:
@@ -134,15 +137,26 @@ def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, stat
     for i in range(v.size):
         x = v[i]
         dv = x - last
+        if rated:
+            jumps = 1 if abs(dv) > JUMP else 0
+            now = abs(dv) / periods[jumps]
+            behind = lagged - now
+            for j in range(m + q):
+                move = (dv_in[j, i] - last_in[j]) / periods[jumps] if j < m else 0.0
+                now_by = copysign(1.0, dv) * move if dv != 0.0 else abs(move)
+                of_tau = 1.0 if j >= m and own[j - m] == LAG else 0.0
+                speed_by[j], lagged_by[j] = lagged_slopes(
+                    lag[jumps], behind, now, lagged_by[j] - now_by, now_by, of_tau
+                )
+            speed = now + lag[jumps, SHARE] * behind
+            lagged = lag[jumps, LEFT] * (now + lag[jumps, FADE] * behind)
         if dv != 0.0:
             last = x
             s = copysign(1.0, dv)
             drive = s * p[A]
             drive_by[A] = s
             drive_by_speed = 0.0
-            period = jump_period if abs(dv) > JUMP else sample_period
             if rated:
-                speed = abs(dv) / period
                 factor = rate_factor(speed, p[RATE_EXPONENT])
                 drive_by[RATE] = drive * factor
                 if k != 0.0:
@@ -151,6 +165,9 @@ def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, stat
                     drive_by[RATE_EXPONENT] = drive * k * factor_by_a
                     if speed > SLOWEST:
                         drive_by_speed = drive * k * exp((e - 1.0) * ln)
+                    for j in range(q):
+                        if own[j] == LAG:
+                            drive_by[LAG] = drive_by_speed * speed_by[m + j]
                     drive_by[A] = s * (1.0 + k * factor)
                     drive = drive * (1.0 + k * factor)
             steps = 1
@@ -186,13 +203,11 @@ def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, stat
                 h_next, full = advance_slopes(
                     h, drive, length, power * loss - bend - gm, power * loss_flipped - bend + gm
                 )
-                by_v = s * (full[1] * drive_by_speed / period + full[2] / steps)
                 for j in range(m):
-                    fresh = by_v * (dv_in[j, i] - last_in[j])
+                    move, faster = s * (dv_in[j, i] - last_in[j]) / steps, drive_by_speed * speed_by[j]
+                    fresh = full[1] * faster + full[2] * move
                     if n != 1.0:
-                        move = s * (dv_in[j, i] - last_in[j])
-                        middle_by = half[0] * tangent[j] + half[1] * drive_by_speed * move / period
-                        middle_by += 0.5 * half[2] * move / steps
+                        middle_by = half[0] * tangent[j] + half[1] * faster + 0.5 * half[2] * move
                         middle_by += (half[3] * loss + half[4] * loss_flipped) * first_by_h * tangent[j]
                         fresh += (full[3] * loss + full[4] * loss_flipped) * power_by_h * middle_by
                     tangent[j] = full[0] * tangent[j] + fresh
@@ -219,7 +234,7 @@ def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, stat
             for j in range(m):
                 move = dv_in[j, i] - last_in[j]
                 if move != 0.0:
-                    tangent[j] += slope_at(h, p, copysign(1.0, move)) * move
+                    tangent[j] += slope_at(h, p, copysign(1.0, move), speed) * move
         by_v = 3.0 * p1 * x * x + p2
         for j in range(m):
             last_in[j] = dv_in[j, i]
@@ -229,4 +244,4 @@ def linearise_general(v, dv_in, p, p1, p2, own, sample_period, jump_period, stat
         dw[m + q, i] = x * x * x
         dw[m + q + 1, i] = x
         w[i] = p1 * x * x * x + p2 * x + h
-    state[0], state[1] = h, last
+    state[0], state[1], state[2] = h, last, lagged

@@ -30,7 +30,7 @@ from math import ceil, copysign, expm1, log, log1p
 
 import numpy as np
 
-from .kernel import inlined, kernel
+from ..kernel import inlined, kernel
 
 LOOP = ("A", "beta", "gamma", "phi1", "phi2", "n", "k", "a")
 """Names of the loop parameters, in the order of their array."""
@@ -108,14 +108,13 @@ def sub_steps(length):
 
 
 @inlined
-def general_step(h, dv, p, sample_period, jump_period):
-    """h of the loop with all terms after a step dv ≠ 0. A jump takes `jump_period`, other steps `sample_period`."""
+def step_at_speed(h, dv, p, speed):
+    """h of the loop with all terms after a step dv ≠ 0, for a speed |v̇| of the rate law."""
     n, k = p[EXPONENT], p[RATE]
     s = copysign(1.0, dv)
     drive = s * p[A]
     if k != 0.0:
-        period = jump_period if abs(dv) > JUMP else sample_period
-        drive = drive * (1.0 + k * rate_factor(abs(dv) / period, p[RATE_EXPONENT]))
+        drive = drive * (1.0 + k * rate_factor(speed, p[RATE_EXPONENT]))
     steps = 1
     if n != 1.0:
         steps = sub_steps(abs(dv))
@@ -131,6 +130,12 @@ def general_step(h, dv, p, sample_period, jump_period):
             same, flipped = power * same, power * flipped
         h = advance(h, drive, length, same - bend - gm, flipped - bend + gm)
     return h
+
+
+@inlined
+def general_step(h, dv, p, sample_period, jump_period):
+    """h of the loop with all terms after a step dv ≠ 0. A jump takes `jump_period`, other steps `sample_period`."""
+    return step_at_speed(h, dv, p, abs(dv) / (jump_period if abs(dv) > JUMP else sample_period))
 
 
 @kernel
@@ -197,7 +202,7 @@ static double plain_step(double h, double dv, double a, double beta, double gamm
 }
 """
 """C function of `plain_step`."""
-GENERAL_IN_C = (
+STEP_AT_SPEED_IN_C = (
     f"""\
 static const double JUMP = {JUMP!r}, SLOWEST = {SLOWEST!r}, SUB_STEP = {SUB_STEP!r};
 static const double SUB_STEP_ROUNDING = {SUB_STEP_ROUNDING!r}, H_REFERENCE = {H_REFERENCE!r};
@@ -214,15 +219,15 @@ static double advance(double h, double drive, double length, double r_same, doub
     return end;
 }
 
-/* h of the Bouc-Wen loop with all its terms after a straight way of dv, which is not zero;
+/* h of the Bouc-Wen loop with all its terms after a straight way of dv, which is not zero, at a speed;
    p = A, beta, gamma, phi1, phi2, n, k, a. */
-static double general_step(double h, double dv, const double *p, double sample_period, double jump_period)
+static double step_at_speed(double h, double dv, const double *p, double speed)
 {
     const double n = p[5], k = p[6], s = copysign(1.0, dv);
     double drive = s * p[0], length = fabs(dv);
     int steps = 1, i;
     if (k != 0.0) {
-        const double rate = log(larger(length / (length > JUMP ? jump_period : sample_period), SLOWEST));
+        const double rate = log(larger(speed, SLOWEST));
         drive = drive * (1.0 + k * (fabs(p[7]) < 1e-9 ? rate : expm1(p[7] * rate) / p[7]));
     }
     if (n != 1.0) {
@@ -246,4 +251,12 @@ static double general_step(double h, double dv, const double *p, double sample_p
 }
 """
 )
+"""C function of `step_at_speed`."""
+GENERAL_IN_C = """\
+/* The step at the speed of a jump, or of another change within a sample. */
+static double general_step(double h, double dv, const double *p, double sample_period, double jump_period)
+{
+    return step_at_speed(h, dv, p, fabs(dv) / (fabs(dv) > JUMP ? jump_period : sample_period));
+}
+"""
 """C function of `general_step`."""
