@@ -66,11 +66,24 @@ else:
 
     def kernel(function: F) -> F:
         """Compile the loop to machine code at first use and keep it on disk."""
-        return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+        return _renewed_with_callees(numba.njit(cache=True, error_model="numpy", nogil=True)(function))
 
     def inlined(function: F) -> F:
         """A kernel of one sample that is inlined into the loops that call it, which avoids the cost of a call."""
-        return numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)(function)
+        options = {"cache": True, "error_model": "numpy", "nogil": True, "forceinline": True}
+        return _renewed_with_callees(numba.njit(**options)(function))
+
+    def _renewed_with_callees(loop: Any) -> Any:
+        """The loop, compiled anew if a file with a kernel that it calls has changed; numba looks at its own file only.
+
+        The machine code of a loop contains that of the kernels that it calls.
+        """
+        called = (loop.py_func.__globals__.get(name) for name in loop.py_func.__code__.co_names)
+        own, *others = (
+            member._cache._cache_file for member in (loop, *called) if isinstance(member, type(loop))
+        )  # numba has no public way
+        own._source_stamp = own._source_stamp, *(other._source_stamp for other in others)
+        return loop
 
     class _FirstCompilation(event.Listener):  # type: ignore[misc]
         """Calls a function when the first kernel is compiled; a kernel that is loaded from disk does not count."""

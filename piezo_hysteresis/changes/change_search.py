@@ -35,7 +35,7 @@ from .signatures import SHAPES, ChangeablePrediction, Shaped, predictions
 
 Array = NDArray[np.float64]
 
-SHORTEST, LONGEST = 0.02, 100.0
+SHORTEST, LONGEST = 0.02, 1000.0
 """Range of delays and time constants in the search [samples]."""
 SHOWN = 0.3
 """Smallest share of the explained residual that must remain when a part of the records is left out."""
@@ -215,7 +215,7 @@ class ChangeSearch:
         """The best size of a delay or of a filter."""
         period = min(p.record.sample_period for p in self.predicted)
         if near is None:
-            sizes = period * np.geomspace(SHORTEST, LONGEST, 16)
+            sizes = period * np.geomspace(SHORTEST, LONGEST, 20)
             sizes = np.concatenate((-sizes[:10][::-1], sizes)) if key == "delay" else sizes
             near = float(min(sizes, key=lambda s: self.account(key, float(s), free, mask).cost))
             low, high = sorted((0.4 * near, 2.2 * near))

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import Softening
+from ..errors import ParameterError
 from ..identification.records.noise_floor import ADEQUATE
 from ..model.model import Model
 from ..record import Record
@@ -136,7 +137,8 @@ def _explanations(search: ChangeSearch, model: Model, progress: Callable[[float]
     lagging = next(e for e in found if e.account.key == "low_pass")
     if _may_be(lagging, least) and lagging.size > 0.0:
         found.append(low_pass_before(search, model, lagging.size))
-    found = [_simulated(e, model) if _may_be(e, least) else e for e in found]
+    simulated = [_simulated(e, model) if _may_be(e, least) else e for e in found]
+    found = [e for e in simulated if e is not None]
     # at similar cost, a delay or a filter of first order comes before one of second order
     found.sort(key=lambda e: e.account.cost * (RIVAL if e.account.key in SECOND_ORDER else 1.0))
     most = RIVAL * max(1.0, found[0].account.cost)
@@ -183,8 +185,8 @@ def error_ratio(model: Model, records: Sequence[Record], used: Sequence[int], fl
     return float(np.sqrt(search.of_equal_records(search.account("none"), floors)))
 
 
-def _simulated(found: Explanation, model: Model) -> Explanation:
-    """A delay or a filter, with the residual that remains when the model simulates it.
+def _simulated(found: Explanation, model: Model) -> Explanation | None:
+    """A delay or a filter, with the residual that remains when the model simulates it; None if no effect is so slow.
 
     An interpolated prediction leaves a larger residual if a stage rings within a few samples. Its size is more certain,
     because the delay of the model was fitted with the same interpolation.
@@ -192,7 +194,11 @@ def _simulated(found: Explanation, model: Model) -> Explanation:
     key, size = found.account.key, found.account.size
     if key not in SHAPES or size < 0.0:
         return found
-    search = found.search.around(shaped_model(model, key, size))
+    try:
+        slower = shaped_model(model, key, size)
+    except ParameterError:
+        return None
+    search = found.search.around(slower)
     exact = search.shaped(key, near=0.0) if key == "delay" else search.account(key)
     least = min(found.account, exact, key=lambda account: account.cost)
     return replace(found, account=replace(found.account, cost=least.cost, left=least.left))

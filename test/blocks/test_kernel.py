@@ -20,6 +20,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from piezo_hysteresis.blocks.kernel import fma, kernel
 
 EPSILON = 2.0**-30
@@ -43,6 +45,22 @@ def test_numba_is_not_loaded_where_its_own_variable_switches_it_off():
     )
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     subprocess.run([sys.executable, "-W", "error", "-c", program], env=environment, check=True)
+
+
+@pytest.mark.parametrize("decorator", ["kernel", "inlined"])
+def test_a_loop_is_compiled_anew_after_a_change_of_a_kernel_that_it_calls(tmp_path, decorator):
+    """After an update, numba would take the old machine code of loops whose own files have not changed."""
+    head = f"from piezo_hysteresis.blocks.kernel import {decorator}\n\n@{decorator}\n"
+    (tmp_path / "twice.py").write_text(f"from once import once\n{head}def twice(x):\n    return once(once(x))\n")
+    (tmp_path / "loop.py").write_text(f"from twice import twice\n{head}def loop(x):\n    return twice(x)\n")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    found = []
+    for added in ("1.0", "10.0"):
+        (tmp_path / "once.py").write_text(f"{head}def once(x):\n    return x + {added}\n")
+        command = [sys.executable, "-c", "from loop import loop; print(loop(0.0))"]
+        run = subprocess.run(command, env=environment, cwd=tmp_path, check=True, capture_output=True, text=True)
+        found.append(float(run.stdout))
+    assert found == [2.0, 20.0]
 
 
 def test_a_compilation_is_reported_once_and_loading_is_not(tmp_path):

@@ -48,7 +48,7 @@ class AmplifierBandwidth(Effect):
         "from the other lags"
     )
     source = "R·C of amplifier and actuator, 15–60 µs"
-    parameters = (Parameter("tau", "τ", "s", 0.0, 0.0, 1e-1, "time constant R·C", "R·C", 0.0, 2e-5),)
+    parameters = (Parameter("tau", "τ", "s", 0.0, 0.0, 10.0, "time constant R·C", "R·C", 0.0, 2e-5),)
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:

@@ -53,7 +53,7 @@ class SecondOrderLowPass(Effect):
     signature = "The whole measurement lags and rolls off; the response to a step starts with zero slope"
     source = "anti-aliasing filters: Butterworth, ζ = 0.7071"
     parameters = (
-        Parameter("tau", "τ", "s", 0.0, 0.0, 1e-1, "time constant of the filter", "filter settings", 0.0, 2e-5),
+        Parameter("tau", "τ", "s", 0.0, 0.0, 10.0, "time constant of the filter", "filter settings", 0.0, 2e-5),
         Parameter("zeta", "ζ", "1", BUTTERWORTH, 0.3, 1.0, "damping ratio of the filter", "Butterworth", fixed=True),
     )
 

@@ -45,7 +45,7 @@ class SensorBandwidth(Effect):
     )
     source = "bandwidth settings of capacitive sensors: 50 Hz, 500 Hz, 5 kHz"
     parameters = (
-        Parameter("tau", "τ", "s", 0.0, 0.0, 1e-1, "time constant of each pole", "sensor settings", 0.0, 2e-5),
+        Parameter("tau", "τ", "s", 0.0, 0.0, 10.0, "time constant of each pole", "sensor settings", 0.0, 2e-5),
         Parameter("poles", "n", "1", 1.0, 1.0, 8.0, "number of poles", "sensor settings", fixed=True),
     )
 

@@ -115,3 +115,22 @@ def test_two_slow_poles_are_found_whatever_the_lag_of_the_best_butterworth_filte
     late, low, high = change.lag
     assert change.key == "low_pass_poles"
     assert low <= stage.filter_lag <= high and late == pytest.approx(stage.filter_lag, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "late", "key"),
+    [
+        ("filter_pole", 0.15, "low_pass"),
+        ("filter_drive", 0.2, "low_pass_before"),
+        ("filter_delay", 0.3, "delay"),
+    ],
+)
+def test_a_lag_of_hundreds_of_samples_is_named(model, name, late, key):
+    """The search ended at 100 samples, and a time constant above 0.1 s was an error."""
+    _, change, seen = change_and_records(model, **{name: late})
+    found, low, high = change.lag
+    assert change.key == key and low <= late <= high
+    assert found == pytest.approx(late, rel=0.01)
+    both = model, changed_model(model, change, seen.records)
+    before, after = (errors(m, seen, free_per_record(m, offset=True)).percent for m in both)
+    assert after < 0.01 * before
