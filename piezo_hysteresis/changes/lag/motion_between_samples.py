@@ -32,7 +32,8 @@ def unseen_lag(model: Model) -> float:
     """Half the interval of a lag that a change of the time of motion between two samples allows [s].
 
     The converter holds every sample, so what a model passes of a step within one sample, a stage passes at any time
-    in it. A mode that was found in the records is known between samples, too, and nothing is left open.
+    in it; a stage that overshoots passes the step within one sample all the same. A mode that was found in the records
+    is known between samples, too, and nothing is left open.
     """
     if ExtraResonance.name in model and not mode_is_inferred(model):
         return 0.0
@@ -40,4 +41,4 @@ def unseen_lag(model: Model) -> float:
     for numerator, denominator in linear_sections(model):
         response = scipy.signal.lfilter(numerator, denominator, response)
     share = np.abs(np.diff(response, prepend=0.0)).max() / abs(response[-1])
-    return float(share * model.sample_period)
+    return float(min(1.0, share) * model.sample_period)
