@@ -43,7 +43,7 @@ def model():
     return identify(played(STAGE, PERIOD, (1.0, 10.0, 60.0)), memory=True).model
 
 
-@pytest.mark.parametrize("share", [0.5, 0.3])
+@pytest.mark.parametrize("share", [0.5, pytest.param(0.3, marks=pytest.mark.soak)])
 def test_faster_records_are_compared_with_the_given_model(model, share):
     another_day = STAGE.on_another_day(np.random.default_rng(5))
     same = diagnose(played(another_day, share * PERIOD, (1.0, 10.0, 60.0)), model)
@@ -55,7 +55,7 @@ def test_faster_records_are_compared_with_the_given_model(model, share):
     assert effect["family"] == "lag" and effect["parameters"]["tau"]["value"] == pytest.approx(2e-3, rel=0.05)
 
 
-@pytest.mark.parametrize("frequencies", [(1.0, 60.0), (1.0, 5.0, 10.0, 60.0)])
+@pytest.mark.parametrize("frequencies", [(1.0, 60.0), pytest.param((1.0, 5.0, 10.0, 60.0), marks=pytest.mark.soak)])
 def test_a_given_model_that_diverges_is_replaced_by_an_identified_one(frequencies):
     experiment = played(STAGE, PERIOD, frequencies)
     unstable = Model((BoucWen(), Arx(a=(-1.58, 0.79), b=(0.21,)), Softening(k3=-1.0)), PERIOD, 2.0, 1e-5)

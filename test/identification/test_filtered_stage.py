@@ -41,7 +41,7 @@ def played(stage, *frequencies):
 @pytest.mark.parametrize(
     ("name", "fitted", "judged"),
     [
-        ("drive", (1.0, 60.0), 10.0),
+        pytest.param("drive", (1.0, 60.0), 10.0, marks=pytest.mark.soak),
         pytest.param("mean", (1.0, 60.0), 10.0, marks=pytest.mark.soak),
         ("pole", (1.0, 10.0), 60.0),
         ("butterworth", (1.0, 10.0), 60.0),
@@ -86,6 +86,7 @@ def test_the_lag_of_one_rate_is_not_taken_for_creep():
     assert found.model["arx"].pole_radius < 0.8
 
 
+@pytest.mark.soak
 def test_no_low_pass_is_stated_that_the_stage_has_not():
     """A time constant of 0 s was stated as that of an amplifier."""
     stage = Nanopositioner(mode=500.0, zeta=0.0107, pole=1e-6, delay=1.6e-4)

@@ -57,7 +57,8 @@ def test_a_mode_that_only_triangles_excite_is_fitted_and_named():
     assert np.std(error) < 3e-3 * np.ptp(other.displacement)
 
 
-@pytest.mark.parametrize("share", [pytest.param(0.06, marks=pytest.mark.soak), 0.3])
+@pytest.mark.soak
+@pytest.mark.parametrize("share", [0.06, 0.3])
 def test_two_modes_are_described_at_a_rate_left_out(share):
     """The stage rings at 400 and 650 Hz; without the second mode, the error is up to 0.8 % of the range."""
     stage = Nanopositioner(mode=400.0, zeta=0.02, second_share=share, second_mode=650.0)
@@ -78,13 +79,14 @@ def test_one_mode_is_not_taken_for_two():
     assert "one at" not in said
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(
     ("mode", "delay", "fitted", "judged"),
     [
         (1284.0, 2.3e-4, (1.0,), 60.0),
-        pytest.param(1477.0, 5.4e-5, (1.0, 60.0), 10.0, marks=pytest.mark.soak),
-        pytest.param(1860.0, 2.3e-4, (1.0,), 60.0, marks=pytest.mark.soak),
-        pytest.param(1441.0, 6e-5, (1.0, 60.0), 10.0, marks=pytest.mark.soak),
+        (1477.0, 5.4e-5, (1.0, 60.0), 10.0),
+        (1860.0, 2.3e-4, (1.0,), 60.0),
+        (1441.0, 6e-5, (1.0, 60.0), 10.0),
     ],
 )
 def test_samples_that_ring_at_another_frequency_than_the_stage_are_given_no_mode(mode, delay, fitted, judged):

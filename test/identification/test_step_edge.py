@@ -34,7 +34,8 @@ def played(stage, *frequencies):
     return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives))
 
 
-@pytest.mark.parametrize("rise", [pytest.param(2.5, marks=pytest.mark.soak), 6.0])
+@pytest.mark.soak
+@pytest.mark.parametrize("rise", [2.5, 6.0])
 def test_a_step_behind_a_largest_current_is_predicted_at_a_rate_left_out(rise):
     """The error was 1.3 to 2.4 % of the range, most of it in the ringing after the step."""
     slope = 5.0 / (rise * PERIOD)
@@ -75,6 +76,7 @@ def test_the_edge_does_not_hide_the_ringing_of_a_step_in_its_own_record():
     assert {p.phase: p.percent for p in found.phases}["step"] < 0.1
 
 
+@pytest.mark.soak
 def test_a_filter_beside_a_light_mode_is_no_largest_current():
     """A slope that lets the step pass in 0.74 samples was stated; without it, poles describe the step as well."""
     stage = Nanopositioner(mode=213.0, zeta=0.013, filter_twice=6e-4, seed=1)

@@ -44,7 +44,7 @@ def played(stage: Nanopositioner, frequency: float, first: int) -> tuple[Record,
 
 
 @pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.soak), 2])
-@pytest.mark.parametrize(("first", "kind"), [(0, "step_edge"), (7, "step_time")])
+@pytest.mark.parametrize(("first", "kind"), [(0, "step_edge"), pytest.param(7, "step_time", marks=pytest.mark.soak)])
 def test_a_step_at_another_time_than_its_sample_does_not_disturb_the_sines(seed, first, kind):
     """The lag was a compromise between both, with errors of 0.5 % at 30 Hz."""
     rng = np.random.default_rng(seed)

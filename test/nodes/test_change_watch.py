@@ -133,9 +133,9 @@ def model_after(group):
 @pytest.mark.parametrize(
     ("group", "parameter", "new"),
     [
-        ("gain", "displacement_scale", 1.005e-5),
+        pytest.param("gain", "displacement_scale", 1.005e-5, marks=pytest.mark.soak),
         ("loop", "bouc_wen.A", 1.03 * MODEL.values()["bouc_wen.A"]),
-        ("dynamics", "arx.delay", MODEL.values()["arx.delay"] + 0.05),
+        pytest.param("dynamics", "arx.delay", MODEL.values()["arx.delay"] + 0.05, marks=pytest.mark.soak),
     ],
 )
 def test_after_an_alarm_the_group_is_recalibrated_and_the_residual_is_back(lab, tmp_path, group, parameter, new):

@@ -109,6 +109,7 @@ def test_the_page_states_the_numbers_of_its_commands(identified, diagnosed, fold
         assert f"by {read_lag / 1e3:.4g} s" in notice.message
 
 
+@pytest.mark.soak
 def test_drift_in_addition_to_creep_does_not_increase_the_error(fitted, unseen):
     found = diagnose(fitted, effects=(ThermalDrift,))
     assert settled_percent(found.model, fitted) <= 0.32
