@@ -146,7 +146,10 @@ def settled(candidate: FittedCandidate, before: Score) -> FittedCandidate:
 
 
 def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
-    """The candidate in its form with more parameters, if the data need it and it is better."""
+    """The candidate in its form with more parameters, if the data need it and it is better.
+
+    Another law of the effect has to close the gap: it could absorb a part of a further effect that is missing.
+    """
     finer = candidate.effect.refined()
     gain = before.cost - candidate.score.cost
     if finer is None or not leaves_room(candidate.score) or gain < LEAST_GAIN:
@@ -154,7 +157,8 @@ def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
     refined = refit(candidate.fit.model.without(candidate.name), replace(candidate, effect=finer), LATER)
     if refined is None or refined.score.cost > candidate.score.cost - TIE:
         return candidate
-    return settled(refined, before)
+    refined = settled(refined, before)
+    return candidate if finer.name != candidate.name and leaves_room(refined.score) else refined
 
 
 def simplest(refits: list[FittedCandidate]) -> FittedCandidate:
