@@ -148,7 +148,7 @@ def settled(candidate: FittedCandidate, before: Score) -> FittedCandidate:
 def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
     """The candidate in its form with more parameters, if the data need it and it is better.
 
-    Another law of the effect has to close the gap: it could absorb a part of a further effect that is missing.
+    Another law of the effect has to reach the floor: it could absorb a part of a further effect that is missing.
     """
     finer = candidate.effect.refined()
     gain = before.cost - candidate.score.cost
@@ -158,7 +158,7 @@ def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
     if refined is None or refined.score.cost > candidate.score.cost - TIE:
         return candidate
     refined = settled(refined, before)
-    return candidate if finer.name != candidate.name and leaves_room(refined.score) else refined
+    return candidate if finer.name != candidate.name and refined.score.excess > ADEQUATE else refined
 
 
 def simplest(refits: list[FittedCandidate]) -> FittedCandidate:
