@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -34,6 +35,7 @@ import numpy as np
 import picture
 import rclpy
 import scan
+import yaml
 from bench import Bench, Trace
 from numpy.typing import NDArray
 from probe import probe
@@ -42,10 +44,12 @@ from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from scan import Scan
+from truth import in_numbers_of
 
 from piezo_hysteresis import Model, load
 from piezo_hysteresis.identification import DriveLimits
 from piezo_hysteresis.nodes.messages.conversions import values_of
+from piezo_hysteresis.stage.plant import PlantParameters
 
 ROOT = Path(__file__).parents[2]
 NAMESPACE = "/demo"
@@ -190,10 +194,17 @@ class Demo:
         subprocess.run([*command, "--force", "-o", self.folder / "report.html"], check=True, stdout=subprocess.DEVNULL)
         self.say(f"written: {os.path.relpath(self.folder)}/report.html, residual.png, scan.png, scan.csv")
 
-    def reveal(self) -> None:
-        """Print the hidden effect."""
-        with (self.folder / "plant.yaml").open() as plant:
-            self.say(f"[bold]the plant file opens: {plant.readline().removeprefix('# ').strip()}[/bold]")
+    def reveal(self, experiment: Path) -> None:
+        """Print the hidden effect, and what it is in the units of the model that was found."""
+        text = (self.folder / "plant.yaml").read_text()
+        first = text.partition("\n")[0].removeprefix("# ")
+        self.say(f"[bold]the plant file opens: {first}[/bold]")
+        if (experiment / "diagnosis.yaml").exists():
+            hidden = {name: float(value) for name, value in re.findall(r"([\w.]+) = ([^,)]+)", first)}
+            stage = PlantParameters.from_mapping(yaml.safe_load(text))
+            same = in_numbers_of(load(experiment / "diagnosis.yaml"), stage, hidden)
+            for name, value in same.items():
+                self.say(f"in the units of the model, this is {name} = {value:.4g}")
         self.say("like every simulated stage it also has an amplifier with a pole of its own, at 10 kHz")
         if self.conclusion == "nothing_missing":
             self.say("the identified model contained it already: its residual was at the noise before the search")
@@ -238,7 +249,7 @@ def main() -> int:
         experiment = demo.run(bench)
     demo.say("the nodes have ended, the stage is at its safe voltage; `scripts/run page_node` shows stages that run")
     demo.report(experiment)
-    demo.reveal()
+    demo.reveal(experiment)
     return 0
 
 

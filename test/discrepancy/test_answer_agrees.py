@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 from benchmarks.naming_cases import Case
+from examples.demo.truth import in_numbers_of
 from examples.hide_effect import HIGHEST_VOLTAGE, individual_stage
 from piezo_hysteresis.discrepancy import Verdict, conclusion, diagnose
 from piezo_hysteresis.discrepancy.gap import measure_gap
@@ -82,7 +83,15 @@ def test_a_model_that_diverges_on_a_test_record_is_not_named(monkeypatch):
 @pytest.mark.soak
 @pytest.mark.parametrize("seed", range(20))
 def test_every_stage_of_the_demonstration_is_reported_the_same_everywhere(seed):
-    check_agreement(diagnose(recorded(seed)))
+    found = diagnose(recorded(seed))
+    check_agreement(found)
+    hidden = hidden_effect(seed, individual_stage(seed), highest_voltage=HIGHEST_VOLTAGE)
+    same = in_numbers_of(found.model, hidden.parameters, hidden.changes) if found.names else {}
+    for name, value in same.items():
+        effect, _, number = name.partition(".")
+        (row,) = (row for row in found.effects() if row["name"] == effect)
+        low, high = row["parameters"][number]["interval_95"]
+        assert low <= value <= high
 
 
 def check_agreement(found):
