@@ -70,6 +70,7 @@ def test_a_pole_is_found_where_it_is(place, late):
     assert lag_holds(found, stage, PERIOD)
 
 
+@pytest.mark.soak
 def test_one_slow_rate_does_not_tell_where_the_pole_is():
     """The lag depends on the place, so its interval holds both."""
     stage = Nanopositioner(mode=400.0, filter_drive=1e-3)

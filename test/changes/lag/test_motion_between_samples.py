@@ -39,7 +39,16 @@ def change_of(model, stage):
     return find_change(model, records, range(2), least.tolist())
 
 
-@pytest.fixture(scope="module", params=[(783.0, 6e-4), (1310.0, 6e-4), (2747.0, 2e-5), (2747.0, 6e-4)], ids=str)
+MODES = [
+    pytest.param((783.0, 6e-4), marks=pytest.mark.soak),
+    pytest.param((1310.0, 6e-4), marks=pytest.mark.soak),
+    (2747.0, 2e-5),
+    (2747.0, 6e-4),
+]
+"""Frequencies [Hz] and delays [s]."""
+
+
+@pytest.fixture(scope="module", params=MODES, ids=str)
 def stage_and_model(request):
     """Stages with a mode above half the sampling rate, which move within one sample."""
     mode, delay = request.param
