@@ -54,6 +54,8 @@ from piezo_hysteresis.stage.plant import PlantParameters
 ROOT = Path(__file__).parents[2]
 NAMESPACE = "/demo"
 LIMITS = DriveLimits()
+ZEROED = 0.5
+"""Time in which the model node measures the zero of the sensor, while the stage rests [s]."""
 PATIENCE = 600.0
 """Longest wait for a protocol or a fit [s]."""
 signalled: list[int] = []
@@ -114,7 +116,12 @@ class Demo:
         self.say(f"live page: http://{address} in a browser on this machine, while the demo runs")
 
     def look(self, bench: Bench, name: str, model: Model) -> None:
-        """Play the probe and show the residual of the model node, which follows `model`."""
+        """Play the probe and show the residual of the model node, which follows `model`.
+
+        The zero is measured again first: remanence that earlier motion has removed is an offset, and no error.
+        """
+        bench.call("zero")
+        bench.pause(ZEROED)
         trace = bench.play(np.concatenate(list(self.parts.values())), "probe")
         self.traces[name] = trace
         before = next(iter(self.traces.values())).rms

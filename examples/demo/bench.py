@@ -43,7 +43,11 @@ from piezo_hysteresis.nodes.topics import TOPICS
 
 Array = NDArray[np.float64]
 
-SERVICES = {"identification_node": ("plan", "identify", "diagnose"), "compensation_node": ("learn",)}
+SERVICES = {
+    "identification_node": ("plan", "identify", "diagnose"),
+    "compensation_node": ("learn",),
+    "model_node": ("zero",),
+}
 """Services that are called, by node."""
 KEPT = 3000
 """Blocks of samples that are kept: half a minute."""
@@ -195,7 +199,7 @@ class Bench:
         self.wait(lambda: time.monotonic() > end, "the end of a pause", 2.0 * duration + 10.0)
 
     def call(self, service: str) -> Trigger.Response:
-        """Call a service of the identification or the compensation node, which answers at once."""
+        """Call a service of a node, which answers at once."""
         client = self._services[service]
         self.wait(client.service_is_ready, f"service {service}", 60.0)
         future = client.call_async(Trigger.Request())
