@@ -118,10 +118,11 @@ class Demo:
     def look(self, bench: Bench, name: str, model: Model) -> None:
         """Play the probe and show the residual of the model node, which follows `model`.
 
-        The zero is measured again first: remanence that earlier motion has removed is an offset, and no error.
+        After earlier motion the zero is measured again: remanence that it has removed is an offset, and no error.
         """
-        bench.call("zero")
-        bench.pause(ZEROED)
+        if self.traces:
+            bench.call("zero")
+            bench.pause(ZEROED)
         trace = bench.play(np.concatenate(list(self.parts.values())), "probe")
         self.traces[name] = trace
         before = next(iter(self.traces.values())).rms
