@@ -42,8 +42,10 @@ from .bouc_wen_kernel import (
 )
 from .speed_lag import FADE, LEFT, SHARE, lagged_slopes
 
-START, LAG = len(LOOP), len(LOOP) + 1
-"""Indices in the own rows of the initial state, which has no forcing term, and of the lag of the speed."""
+OWN = (*LOOP, "h0", "tau")
+"""Numbers of the loop and its terms, in the order of their indices in the own rows."""
+START, LAG = OWN.index("h0"), OWN.index("tau")
+"""Indices of the initial state, which has no forcing term, and of the lag of the speed."""
 
 
 @kernel
@@ -117,15 +119,15 @@ def linearise_plain(v, p, p1, p2, state, tangent, w, dw):
 def linearise_general(v, dv_in, p, p1, p2, own, periods, lag, state, tangent, last_in, lagged_by, w, dw):
     """`run_general` or `run_lagged` with sensitivities.
 
-    dv_in (m, n) are incoming rows; own (q,) are the indices of the own rows in `LOOP`, `START` or `LAG`; `periods` are
-    those of a step and of a jump; tangent (m + q,) is ∂h, last_in (m,) are the incoming sensitivities of v_last, and
-    lagged_by (m + q,) those of the lagged speed; dw (m + q + 2, n) is filled, with p1 and p2 last. While v is constant,
-    a changing row counts as motion in its direction: the derivative for a growing parameter.
+    dv_in (m, n) are incoming rows; own (q,) are the indices of the own rows in `OWN`; `periods` are those of a step and
+    of a jump; tangent (m + q,) is ∂h, last_in (m,) are the incoming sensitivities of v_last, and lagged_by (m + 1,)
+    those of the lagged speed, by the incoming rows and by τ; dw (m + q + 2, n) is filled, with p1 and p2 last. While v
+    is constant, a changing row counts as motion in its direction: the derivative for a growing parameter.
     """
     m, q = dv_in.shape[0], own.size
     n, k = p[EXPONENT], p[RATE]
     h, last, lagged, speed = state[0], state[1], state[2], 0.0
-    speed_by = np.zeros(m + q)
+    speed_by = np.zeros(m + 1)
     drive_by = np.zeros(LAG + 1)
     same_by = np.zeros(LAG + 1)
     flipped_by = np.zeros(LAG + 1)
@@ -141,10 +143,10 @@ def linearise_general(v, dv_in, p, p1, p2, own, periods, lag, state, tangent, la
             jumps = 1 if abs(dv) > JUMP else 0
             now = abs(dv) / periods[jumps]
             behind = lagged - now
-            for j in range(m + q):
+            for j in range(m + 1):
                 move = (dv_in[j, i] - last_in[j]) / periods[jumps] if j < m else 0.0
                 now_by = copysign(1.0, dv) * move if dv != 0.0 else abs(move)
-                of_tau = 1.0 if j >= m and own[j - m] == LAG else 0.0
+                of_tau = 1.0 if j == m else 0.0
                 speed_by[j], lagged_by[j] = lagged_slopes(
                     lag[jumps], behind, now, lagged_by[j] - now_by, now_by, of_tau
                 )
@@ -165,9 +167,7 @@ def linearise_general(v, dv_in, p, p1, p2, own, periods, lag, state, tangent, la
                     drive_by[RATE_EXPONENT] = drive * k * factor_by_a
                     if speed > SLOWEST:
                         drive_by_speed = drive * k * exp((e - 1.0) * ln)
-                    for j in range(q):
-                        if own[j] == LAG:
-                            drive_by[LAG] = drive_by_speed * speed_by[m + j]
+                    drive_by[LAG] = drive_by_speed * speed_by[m]
                     drive_by[A] = s * (1.0 + k * factor)
                     drive = drive * (1.0 + k * factor)
             steps = 1

@@ -32,7 +32,7 @@ from ...blocks.bouc_wen.bouc_wen_kernel import (
     run_general,
     run_plain,
 )
-from ...blocks.bouc_wen.bouc_wen_sensitivities import START, linearise_general, linearise_plain
+from ...blocks.bouc_wen.bouc_wen_sensitivities import OWN, START, linearise_general, linearise_plain
 from ...blocks.bouc_wen.speed_lag import FADE, LAGGED_STEP, LEFT, SHARE, run_lagged, speed_lag
 from ...c_form import CForm, Number
 from ...errors import ParameterError
@@ -163,8 +163,12 @@ class BoucWen(ModifiedBoucWen):
         return BoucWenBlock(self, setting, terms)
 
 
-OWN = (*LOOP, "h0", "tau")
-"""Numbers of the loop and its terms, each with its index in the sensitivities."""
+PLAIN_STEP, GENERAL_STEP = (
+    f"const double dv = x - s->v;\nif (dv != 0.0) {{\n    s->v = x;\n    s->h = {call};\n}}\n"
+    "return p1 * x * x * x + p2 * x + s->h;"
+    for call in ("plain_step(s->h, dv, A, beta, gamma)", "general_step(s->h, dv, loop, period, jump_period)")
+)
+"""C code of one sample of the loop, plain and with terms."""
 
 
 class BoucWenBlock(Block):
@@ -216,7 +220,7 @@ class BoucWenBlock(Block):
         return w, state
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
-        return np.append(np.zeros(len(dx0)), self.own == START), np.array(dx0), np.zeros(len(dx0) + self.own.size)
+        return np.append(np.zeros(len(dx0)), self.own == START), np.array(dx0), np.zeros(len(dx0) + 1)
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         w, state = np.empty_like(x), state.copy()
@@ -232,16 +236,11 @@ class BoucWenBlock(Block):
 
     def c_form(self) -> CForm:
         numbers: dict[str, Number] = {"p1": self.p1, "p2": self.p2, "h0": self.start}
-        step = (
-            "const double dv = x - s->v;\nif (dv != 0.0) {{\n    s->v = x;\n    s->h = {};\n}}\n"
-            "return p1 * x * x * x + p2 * x + s->h;"
-        )
-        library = self.library
+        step, library = PLAIN_STEP, self.library
         if self.is_plain:
-            step = step.format("plain_step(s->h, dv, A, beta, gamma)")
             numbers |= dict(zip(LOOP[:3], self.loop.tolist(), strict=False))
         else:
-            step = step.format("general_step(s->h, dv, loop, period, jump_period)")
+            step = GENERAL_STEP
             numbers |= {"loop": self.loop, "period": self.sample_period, "jump_period": self.jump_period}
             if self.tau:
                 step, library = LAGGED_STEP, (ADVANCE_IN_C, STEP_AT_SPEED_IN_C)
