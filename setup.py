@@ -95,6 +95,7 @@ setup(
             f"axis_node = {NAME}.nodes.start:axis_node",
             f"driver_node = {NAME}.nodes.start:driver_node",
             f"model_node = {NAME}.nodes.start:model_node",
+            f"axes_model_node = {NAME}.nodes.start:axes_model_node",
             f"identification_node = {NAME}.nodes.start:identification_node",
             f"compensation_node = {NAME}.nodes.start:compensation_node",
             f"page_node = {NAME}.nodes.start:page_node",

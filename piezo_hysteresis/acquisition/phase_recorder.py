@@ -125,10 +125,18 @@ def _records(blocks: list[SampleBlock], name: str, period: float, average: int, 
             pieces.append([block])
     records: list[Record] = []
     for piece in pieces:
-        voltage, displacement = (
-            np.concatenate([getattr(block, channel) for block in piece]) for channel in ("voltage", "displacement")
+        voltage, displacement, *others = (
+            np.concatenate([block.columns[channel] for block in piece])
+            for channel in ("voltage", "displacement", *piece[0].channels)
         )
-        start = int(piece[0].index[0]) * period
-        record = Record(voltage, displacement, period, name, start, continues=continues or bool(records))
+        record = Record(
+            voltage,
+            displacement,
+            period,
+            name,
+            start_time=int(piece[0].index[0]) * period,
+            continues=continues or bool(records),
+            channels=dict(zip(piece[0].channels, others, strict=True)),
+        )
         records.append(record.decimate(average) if 1 < average <= record.size else record)
     return records

@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,9 @@ from numpy.typing import NDArray
 
 from ..stage.stage import Acquired, Samples
 from .drive import Event
+
+_COLUMNS = ("time", "voltage", "displacement", "index", "phase")
+"""Arrays that every block has."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -49,6 +53,8 @@ class SampleBlock:
     follows_gap : bool
         True if the samples missing before the block were never measured (a device reads out its memory). If it is
         False, missing samples mean lost messages.
+    channels : mapping of str to (n,) ndarray
+        Further measured channels, as in `Record.channels`.
     """
 
     stamp: int
@@ -59,6 +65,7 @@ class SampleBlock:
     phase: NDArray[np.uint32]
     frame: str = ""
     follows_gap: bool = False
+    channels: Mapping[str, Samples] = field(default_factory=dict)
 
     @classmethod
     def acquired(
@@ -81,6 +88,7 @@ class SampleBlock:
             index=np.arange(first, first + count).astype(np.uint32),  # modulo 2^32
             phase=phase,
             follows_gap=follows_gap,
+            channels=acquired.channels,
         )
 
     @property
@@ -91,19 +99,20 @@ class SampleBlock:
     @property
     def columns(self) -> dict[str, NDArray]:
         """Arrays by field name of the topic `samples`."""
-        return {name: getattr(self, name) for name in ("time", "voltage", "displacement", "index", "phase")}
+        return {**{name: getattr(self, name) for name in _COLUMNS}, **self.channels}
 
     def after(self, count: int) -> SampleBlock:
         """The block without its first `count` samples."""
-        if count == 0:
-            return self
-        kept: dict[str, Any] = {name: values[count:] for name, values in self.columns.items()}
-        return replace(self, **kept)
+        return self if count == 0 else self._part(slice(count, None), self.follows_gap)
 
     def between(self, first: int, end: int) -> SampleBlock:
         """Samples from `first` up to, but not including, `end`. Only the first part of a block can follow a gap."""
-        kept: dict[str, Any] = {name: values[first:end] for name, values in self.columns.items()}
-        return replace(self, **kept, follows_gap=self.follows_gap and first == 0)
+        return self._part(slice(first, end), self.follows_gap and first == 0)
+
+    def _part(self, part: slice, follows_gap: bool) -> SampleBlock:
+        kept: dict[str, Any] = {name: getattr(self, name)[part] for name in _COLUMNS}
+        others = {name: values[part] for name, values in self.channels.items()}
+        return replace(self, **kept, channels=others, follows_gap=follows_gap)
 
     @property
     def sample_period(self) -> float | None:

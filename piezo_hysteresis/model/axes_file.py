@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import zipfile
 from dataclasses import fields
 from pathlib import Path
@@ -27,6 +28,12 @@ from .axes_model import AxesModel
 
 _NAMES = tuple(f.name for f in fields(AxesModel) if f.init)
 """Keys of the file."""
+
+_NUMBERS = ("sample_period", "reference", "memory", "level_max")
+"""Keys with one number."""
+
+_OPTIONAL = ("level_max", "free_run_error")
+"""Keys that files of earlier versions do not have."""
 
 
 def save(model: AxesModel, path: str | Path) -> Path:
@@ -64,10 +71,10 @@ def load(path: str | Path) -> AxesModel:
         with path.open("rb") as file, zipfile.ZipFile(file):  # np.load takes other files for pickled objects
             pass
         with np.load(path, allow_pickle=False) as file:
-            if missing := [name for name in _NAMES if name not in file]:
+            if missing := [name for name in _NAMES if name not in file and name not in _OPTIONAL]:
                 raise ModelError(f"{path}: got an NPZ file without '{missing[0]}', {expected}")
-            values = {name: file[name] for name in _NAMES}
-        period, reference, memory = (float(values[name]) for name in ("sample_period", "reference", "memory"))
+            values = {name: file[name] for name in _NAMES if name in file}
+        numbers = {name: float(value) for name, value in values.items() if name in _NUMBERS}
     except OSError as error:
         raise ModelError(f"{path}: {error.strerror or error}, {expected}") from None
     except zipfile.BadZipFile:
@@ -76,4 +83,12 @@ def load(path: str | Path) -> AxesModel:
         raise
     except (ValueError, TypeError) as error:
         raise ModelError(f"{path}: damaged ({error}), {expected}") from None
-    return AxesModel(values["taps"], values["elongation"], values["radii"], values["zero"], period, reference, memory)
+    return AxesModel(**values | numbers)
+
+
+def content_hash(model: AxesModel) -> str:
+    """``sha256:`` and 16 digits of every number that a prediction depends on."""
+    digest = hashlib.sha256()
+    for name in (name for name in _NAMES if name not in _OPTIONAL):
+        digest.update(np.asarray(getattr(model, name), dtype="<f8").tobytes())
+    return f"sha256:{digest.hexdigest()[:16]}"

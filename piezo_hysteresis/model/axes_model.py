@@ -73,6 +73,10 @@ class AxesModel:
         Level of the drives at which A = 1 [V].
     memory : float
         Time constant of the running mean square [s].
+    level_max : float
+        Largest running rms of the drives that was identified [V]; infinite if it is not known.
+    free_run_error : (p,) array_like
+        RMS error in free run [m], as `piezo identify` prints it; empty if it is not known.
 
     Raises
     ------
@@ -87,10 +91,12 @@ class AxesModel:
     sample_period: float
     reference: float
     memory: float
+    level_max: float = np.inf
+    free_run_error: Array = field(default_factory=lambda: np.empty(0))
     _decay: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name in ("taps", "elongation", "radii", "zero"):
+        for name in ("taps", "elongation", "radii", "zero", "free_run_error"):
             value = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
             if not np.isfinite(value).all():
                 raise ModelError(f"{name}: got numbers that are not finite, expected a model of `piezo identify`")
@@ -98,6 +104,8 @@ class AxesModel:
         for name in ("sample_period", "reference", "memory"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise ModelError(f"{name}: got {getattr(self, name)!r}, expected a positive number")
+        if not self.level_max > 0:
+            raise ModelError(f"level_max: got {self.level_max!r}, expected a positive number")
         if self.elongation.ndim != 2 or self.radii.ndim != 1:
             raise ModelError("elongation, radii: expected two dimensions and one")
         inputs, outputs = self.elongation.shape
@@ -107,6 +115,8 @@ class AxesModel:
                 f"taps: got shape {self.taps.shape}, expected (passes, {wanted[0]}, length, {wanted[1]}) "
                 f"and {outputs} zeros for {inputs} drives and {outputs} displacements"
             )
+        if self.free_run_error.shape not in ((0,), (outputs,)):
+            raise ModelError(f"free_run_error: got shape {self.free_run_error.shape}, expected ({outputs},)")
         object.__setattr__(self, "_decay", float(np.exp(-self.sample_period / self.memory)))
 
     @property

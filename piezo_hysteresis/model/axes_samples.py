@@ -41,7 +41,12 @@ def names(record: Record, quantity: str) -> tuple[str, ...]:
     >>> names(r, "voltage"), names(r, "displacement")
     (('voltage', 'voltage_2'), ('displacement', 'displacement_3'))
     """
-    found = [(axis[1], name) for name in record.channels if (axis := axis_of(name)) and axis[0] == quantity]
+    return ordered(record.channels, quantity)
+
+
+def ordered(channels: Iterable[str], quantity: str) -> tuple[str, ...]:
+    """As `names`, from the names of the channels besides ``voltage`` and ``displacement``."""
+    found = [(axis[1], name) for name in channels if (axis := axis_of(name)) and axis[0] == quantity]
     return (quantity, *(name for _, name in sorted(found)))
 
 

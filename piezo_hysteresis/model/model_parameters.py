@@ -129,7 +129,12 @@ def model_hash(model: Model) -> str:
 
 def hash_number(model: Model) -> int:
     """The first 32 bits of the hash, as `predicted_samples` carries them."""
-    return int(model_hash(model).removeprefix("sha256:")[:8], 16)
+    return first_bits(model_hash(model))
+
+
+def first_bits(content_hash: str) -> int:
+    """The first 32 bits of a hash that begins with ``sha256:``."""
+    return int(content_hash.removeprefix("sha256:")[:8], 16)
 
 
 def _content(model: Model) -> dict[str, Entry]:

@@ -48,6 +48,11 @@ def model_node() -> int:
     return _run("model.model_node")
 
 
+def axes_model_node() -> int:
+    """Run a model node of several axes."""
+    return _run("several_axes.axes_model_node")
+
+
 def identification_node() -> int:
     """Run an identification node."""
     return _run("identification.identification_node")

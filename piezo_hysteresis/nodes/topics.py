@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -157,13 +157,18 @@ TOPICS: dict[str, Topic] = {
 """Topics of an axis by name, in the order of the docs."""
 
 
-def advertise(node: Node, name: str) -> Any:
+def advertise(node: Node, name: str, namespace: str = "") -> Any:
     """A publisher of one of `TOPICS`; raises ParameterError where a parameter names an unknown quality of service."""
-    topic = TOPICS[name]
+    topic = in_namespace(TOPICS[name], namespace)
     with _override_named(node, topic):
         return node.create_publisher(
             topic.type, topic.name, copy(topic.quality), qos_overriding_options=topic.overriding
         )
+
+
+def in_namespace(topic: Topic, namespace: str) -> Topic:
+    """The topic of the axis in another namespace than that of the node; empty for that of the node."""
+    return replace(topic, name=f"{namespace.rstrip('/')}/{topic.name}") if namespace else topic
 
 
 def advertise_lifecycle(node: LifecycleNode, name: str) -> Any:
@@ -174,7 +179,9 @@ def advertise_lifecycle(node: LifecycleNode, name: str) -> Any:
         return node.create_lifecycle_publisher(topic.type, topic.name, quality, qos_overriding_options=topic.overriding)
 
 
-def subscribe(node: Node, name: str, callback: Callable[[Any], None], *, deep: bool = False, raw: bool = False) -> Any:
+def subscribe(
+    node: Node, name: str, callback: Callable[[Any], None], namespace: str = "", *, deep: bool = False, raw: bool = False
+) -> Any:
     """A subscription to one of `TOPICS`.
 
     Parameters
@@ -184,6 +191,8 @@ def subscribe(node: Node, name: str, callback: Callable[[Any], None], *, deep: b
         Of the topic.
     callback : callable
         Called with every message.
+    namespace : str
+        Namespace of the axis; empty for that of the node.
     deep : bool
         Miss no message while the machine is busy.
     raw : bool
@@ -194,7 +203,7 @@ def subscribe(node: Node, name: str, callback: Callable[[Any], None], *, deep: b
     ParameterError
         If a parameter names an unknown quality of service.
     """
-    topic = TOPICS[name]
+    topic = in_namespace(TOPICS[name], namespace)
     quality = topic.deep if deep else copy(topic.quality)
     with _override_named(node, topic):
         return node.create_subscription(

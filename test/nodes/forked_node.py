@@ -35,8 +35,8 @@ INTERVAL = 0.01
 
 @cache
 def _server() -> ForkServer:
-    nodes = ("driver", "model", "identification", "compensation")
-    return ForkServer(*(f"nodes.{name}.{name}_node" for name in nodes), "stage.simulated")
+    nodes = ("driver.driver", "model.model", "several_axes.axes_model", "identification.identification")
+    return ForkServer(*(f"nodes.{name}_node" for name in (*nodes, "compensation.compensation")), "stage.simulated")
 
 
 class ForkedNode:

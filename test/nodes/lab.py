@@ -51,7 +51,7 @@ from .forked_node import ForkedNode
 
 PATIENCE = 60.0
 
-FORKED = ("driver_node", "model_node", "identification_node", "compensation_node")
+FORKED = ("driver_node", "model_node", "axes_model_node", "identification_node", "compensation_node")
 """Executables that start as a fork of a process that has imported them."""
 
 DEEP = QoSProfile(depth=5000, reliability=ReliabilityPolicy.RELIABLE)

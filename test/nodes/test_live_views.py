@@ -35,7 +35,7 @@ from piezo_hysteresis.acquisition.sample_block import Delivery, SampleBlock
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.nodes.driver.publishers import DriverTopics
-from piezo_hysteresis.nodes.model.publishers import ModelTopics
+from piezo_hysteresis.nodes.model.publishers import ModelTopics, Predicted
 from piezo_hysteresis.nodes.topics import TOPICS
 from piezo_hysteresis.online.predictor import Predictor
 
@@ -64,7 +64,8 @@ def published():
     predictor = Predictor(PERIOD, Model((BoucWen(), Arx(b=[0.2])), PERIOD, displacement_scale=1e-4))
     driver.deliver(Delivery(block, 0, ()))
     answer = predictor.predict(0, 0, block.voltage, block.displacement)
-    model.publish(block, answer, answer.model, predictor)
+    results = {"prediction": answer.prediction, "residual": answer.residual}
+    model.publish(Predicted(block, results, 0, answer.warming_up, predictor.residual_rms), n, PERIOD)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     for _ in range(200):

@@ -18,7 +18,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import IdentificationError, ModelError, ParameterError
 from ...identification.identify_axes import LENGTH, AxisError, axes_errors, identify_axes
@@ -65,8 +69,8 @@ def identify(experiment: Experiment, args: argparse.Namespace) -> int:
     if not fitted:
         raise IdentificationError("every phase is held out, expected at least one to fit")
     model = identify_axes(fitted, length=LENGTH if args.taps is None else args.taps)
-    axes_file.save(model, path)
     errors = axes_errors(model, judges or fitted)
+    axes_file.save(replace(model, free_run_error=_error_of_each_axis(errors)), path)
     _show(errors, "not fitted" if judges else "fitted", args.json)
     show_notices(experiment.notices)
     console().print(f"wrote {path}")
@@ -86,6 +90,12 @@ def validate(experiment: Experiment, args: argparse.Namespace) -> int:
     _show(errors, "", args.json)
     show_notices(experiment.notices)
     return _verdict(errors, experiment)
+
+
+def _error_of_each_axis(errors: Sequence[AxisError]) -> NDArray[np.float64]:
+    """Free-run error of every displacement over all records, shape (p,) [m]."""
+    axes = dict.fromkeys(error.displacement for error in errors)
+    return np.sqrt([np.mean([e.rms**2 for e in errors if e.displacement == axis]) for axis in axes])
 
 
 def _verdict(errors: Sequence[AxisError], experiment: Experiment) -> int:

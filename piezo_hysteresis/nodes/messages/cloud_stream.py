@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import array
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,9 +63,9 @@ class Columns:
     values: dict[str, NDArray]
 
 
-def read_cloud(cloud: PointCloud2, required: Mapping[str, str]) -> Columns:
+def read_cloud(cloud: PointCloud2, required: Mapping[str, str], optional: Mapping[str, str] | None = None) -> Columns:
     """Columns of a cloud; fields, types and errors as for `from_cloud`."""
-    return Columns(cloud.header.stamp, cloud.header.frame_id, cloud.is_dense, from_cloud(cloud, required))
+    return Columns(cloud.header.stamp, cloud.header.frame_id, cloud.is_dense, from_cloud(cloud, required, optional))
 
 
 class CloudWriter:
@@ -110,10 +110,12 @@ class CloudReader:
     ----------
     required : mapping of str to str
         Field names and the numpy types wanted.
+    further : callable, optional
+        Whether a field of another name is read too, as float64; default none.
     """
 
-    def __init__(self, required: Mapping[str, str]) -> None:
-        self._required = required
+    def __init__(self, required: Mapping[str, str], further: Callable[[str], object] | None = None) -> None:
+        self._required, self._further = required, further
         self._known: _Known | None = None
 
     def read(self, message: bytes) -> Columns:
@@ -130,16 +132,20 @@ class CloudReader:
             cloud = deserialize_message(message, PointCloud2)
         except RuntimeError as error:  # a middleware may raise any error
             raise RecordError(f"cloud: got {len(message)} bytes of something else, expected a cloud") from error
-        columns = read_cloud(cloud, self._required)
-        self._known = _Known(cloud, message, self._required)
+        names = [field.name for field in cloud.fields] if self._further else []
+        others = {name: "f8" for name in names if name not in self._required and self._further and self._further(name)}
+        columns = read_cloud(cloud, self._required, others)
+        self._known = _Known(cloud, message, self._required, others)
         return columns
 
 
 class _Known:
     """Layout of the messages that are like one deserialised message; that message is modified."""
 
-    def __init__(self, cloud: PointCloud2, message: bytes, required: Mapping[str, str]) -> None:
-        self._dtype, self._wanted = stored_as(cloud, required)
+    def __init__(
+        self, cloud: PointCloud2, message: bytes, required: Mapping[str, str], optional: Mapping[str, str]
+    ) -> None:
+        self._dtype, self._wanted = stored_as(cloud, required, optional)
         self._frame_id = cloud.header.frame_id
         frame = _Frame(cloud)
         self._start, self._stop = frame.start, frame.stop

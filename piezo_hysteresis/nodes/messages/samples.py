@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -23,13 +24,14 @@ from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import PointCloud2
 
 from ...acquisition.sample_block import SampleBlock
+from ...channel_mapping import quantity_of
 from ...errors import RecordError, printable
 from .cloud import to_cloud
 from .cloud_stream import CloudReader, CloudWriter, Columns, read_cloud
 from .conversions import PERIOD_TOLERANCE, Samples, from_stamp, to_stamp
 
 SAMPLES = {"time": "f8", "voltage": "f8", "displacement": "f8", "index": "u4", "phase": "u4"}
-"""Point of `samples`: time@0, voltage@8, displacement@16, index@24, phase@28."""
+"""Point of `samples`: time@0, voltage@8, displacement@16, index@24, phase@28. Further channels of the stage follow."""
 
 PREDICTED_SAMPLES = {
     "time": "f8",
@@ -39,7 +41,8 @@ PREDICTED_SAMPLES = {
     "index": "u4",
     "model": "u4",
 }
-"""Point of `predicted_samples`: time@0, displacement@8, prediction@16, residual@24, index@32, model@36."""
+"""Point of `predicted_samples`: time@0, displacement@8, prediction@16, residual@24, index@32, model@36. The three
+columns of further displacements follow."""
 
 _END_OF_TIME = 2**31
 """Messages count seconds in 32 bits."""
@@ -53,18 +56,20 @@ _LARGEST = {"voltage": 1e4, "displacement": 1.0}
 
 def samples_to_cloud(block: SampleBlock) -> PointCloud2:
     """Message of `samples`."""
-    return to_cloud(block.columns, SAMPLES, to_stamp(block.stamp), block.frame, dense=not block.follows_gap)
+    layout = _with(SAMPLES, block.channels)
+    return to_cloud(block.columns, layout, to_stamp(block.stamp), block.frame, dense=not block.follows_gap)
 
 
 class SampleWriter:
     """Serialised messages of `samples`: the bytes of `samples_to_cloud`, for a stream of blocks."""
 
     def __init__(self) -> None:
-        self._writer = CloudWriter(SAMPLES)
+        self._writer = _GrowingWriter(SAMPLES)
 
     def write(self, block: SampleBlock) -> bytes:
         """Message of one block."""
-        return self._writer.write(block.columns, to_stamp(block.stamp), block.frame, dense=not block.follows_gap)
+        writer = self._writer.of(block.channels)
+        return writer.write(block.columns, to_stamp(block.stamp), block.frame, dense=not block.follows_gap)
 
 
 def samples_from_cloud(cloud: PointCloud2) -> SampleBlock:
@@ -80,10 +85,16 @@ def samples_from_cloud(cloud: PointCloud2) -> SampleBlock:
 
 
 class SampleReader:
-    """Reads blocks from serialised messages of `samples`, also of other software."""
+    """Reads blocks from serialised messages of `samples`, also of other software.
 
-    def __init__(self) -> None:
-        self._reader = CloudReader(SAMPLES)
+    Parameters
+    ----------
+    further : callable, optional
+        Whether a channel of a given name is read besides voltage and displacement; default none.
+    """
+
+    def __init__(self, further: Callable[[str], object] | None = None) -> None:
+        self._reader = CloudReader(SAMPLES, further)
 
     def read(self, message: bytes) -> SampleBlock:
         """Block of one message; raises RecordError as `samples_from_cloud` does."""
@@ -93,13 +104,15 @@ class SampleReader:
 def _block(columns: Columns) -> SampleBlock:
     block = SampleBlock(
         from_stamp(columns.stamp),
-        **columns.values,
+        **{name: columns.values[name] for name in SAMPLES},
         frame=printable(columns.frame_id[:_LONGEST_FRAME]),
         follows_gap=not columns.dense,
+        channels={name: values for name, values in columns.values.items() if name not in SAMPLES},
     )
     _require_consecutive(block)
-    for name, largest in _LARGEST.items():
-        values = getattr(block, name)
+    limits = _LARGEST | {name: _LARGEST.get(quantity_of(name) or "", np.inf) for name in block.channels}
+    for name, largest in limits.items():
+        values = columns.values[name]
         if np.abs(values).max() > largest:
             worst = float(values[np.abs(values).argmax()])
             raise RecordError(f"samples: got a {name} of {worst:g}, expected at most {largest:g}")
@@ -135,10 +148,10 @@ class PredictionWriter:
     """Serialised messages of `predicted_samples`."""
 
     def __init__(self) -> None:
-        self._writer = CloudWriter(PREDICTED_SAMPLES)
+        self._writer = _GrowingWriter(PREDICTED_SAMPLES)
 
     def write(
-        self, block: SampleBlock, prediction: Samples, residual: Samples, model: int, *, valid: bool = True
+        self, block: SampleBlock, results: Mapping[str, Samples], model: int, *, valid: bool = True
     ) -> bytes:
         """Message for the samples of a block.
 
@@ -146,8 +159,9 @@ class PredictionWriter:
         ----------
         block : SampleBlock
             Measured samples.
-        prediction, residual : (n,) ndarray
-            Predicted displacement and measured minus predicted [m].
+        results : mapping of str to (n,) ndarray
+            ``prediction`` and ``residual`` (measured minus predicted) [m]; for a stage of several axes also
+            ``displacement_2``, ``prediction_2``, ``residual_2``, …
         model : int
             First 32 bits of the model's hash.
         valid : bool
@@ -156,9 +170,29 @@ class PredictionWriter:
         columns: dict[str, ArrayLike] = {
             "time": block.time,
             "displacement": block.displacement,
-            "prediction": prediction,
-            "residual": residual,
             "index": block.index,
             "model": model,
+            **results,
         }
-        return self._writer.write(columns, to_stamp(block.stamp), block.frame, dense=valid)
+        further = [name for name in results if name not in PREDICTED_SAMPLES]
+        return self._writer.of(further).write(columns, to_stamp(block.stamp), block.frame, dense=valid)
+
+
+class _GrowingWriter:
+    """A `CloudWriter` for a layout with further fields, which hardly ever change."""
+
+    def __init__(self, layout: Mapping[str, str]) -> None:
+        self._layout = layout
+        self._names: tuple[str, ...] = ()
+        self._writer = CloudWriter(layout)
+
+    def of(self, further: Iterable[str]) -> CloudWriter:
+        """The writer for some further fields."""
+        names = tuple(further)
+        if names != self._names:
+            self._names, self._writer = names, CloudWriter(_with(self._layout, names))
+        return self._writer
+
+
+def _with(layout: Mapping[str, str], further: Iterable[str]) -> dict[str, str]:
+    return {**layout, **dict.fromkeys(further, "f8")}

@@ -33,13 +33,11 @@ from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
 from .change_reporter import ChangeReporter
+from .complaints import Complaints
 from .residual_alarm import ResidualAlarm
 
-_LONGEST_REASON = 500
-"""Largest number of characters of a reason that is repeated every second."""
-
 _LOG_INTERVAL = 0.1
-"""Shortest time between two lines of one kind in the log [s]: a stream of faults must not fill the disk."""
+"""Shortest time between two lines about models in the log [s]: a stream of models must not fill the disk."""
 
 
 class ModelDiagnostics:
@@ -59,8 +57,7 @@ class ModelDiagnostics:
         self._node, self._alarm, self._changes = node, alarm, changes
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: prediction"
         self._publisher = advertise(node, DIAGNOSTICS)
-        self._problem = self._refused = ""
-        self._problems = 0
+        self._complaints = Complaints(node)
         self._frame = ""
         self._model: Model | None = None
         self._predictor: Predictor | None = None
@@ -73,20 +70,16 @@ class ModelDiagnostics:
 
     def problem(self, message: str) -> None:
         """Report a problem in one line, now and in the next report."""
-        if message[:_LONGEST_REASON] != self._problem:
-            self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
-        self._problem = message[:_LONGEST_REASON]
-        self._problems += 1
+        self._complaints.problem(message)
 
     def refused(self, message: str) -> None:
         """Report why a model was refused, until another model is accepted."""
-        self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
-        self._refused = message[:_LONGEST_REASON]
-        self._problems += 1
+        self._complaints.refused(message)
 
     def model(self, model: Model) -> None:
         """Report the model in use from now on."""
-        self._model, self._refused = model, ""
+        self._model = model
+        self._complaints.accepted()
         try:
             self._free_run_error = float(model.provenance["free_run_error"])
         except (KeyError, ValueError):
@@ -111,7 +104,7 @@ class ModelDiagnostics:
         self._range.add(block.voltage)
 
     def _publish(self) -> None:
-        values: dict[str, object] = {"problems": self._problems, "faults": self._node.faults}
+        values: dict[str, object] = {"problems": self._complaints.count, "faults": self._node.faults}
         if self._model is not None:
             values["model"] = model_hash(self._model)
         predictor, received = self._predictor, False
@@ -138,7 +131,8 @@ class ModelDiagnostics:
             }
         findings = list(self._findings(received, lost, repeated)) or [(DiagnosticStatus.OK, "predicting")]
         level, message = max(level for level, _ in findings), "; ".join(text for _, text in findings)
-        self._problem, self._latency = "", 0.0
+        self._complaints.shown()
+        self._latency = 0.0
         array = DiagnosticArray(
             status=[diagnostic(level, self._name, message, self._frame, **values), self._changes.status]
         )
@@ -150,7 +144,7 @@ class ModelDiagnostics:
         clock = self._node.get_clock()
         if clock.ros_time_is_active and clock.now().nanoseconds == 0:
             yield DiagnosticStatus.WARN, "use_sim_time is true, and no message arrives on /clock"
-        for message in filter(None, (self._refused, self._problem, self._node.recent_fault)):
+        for message in filter(None, (*self._complaints.messages, self._node.recent_fault)):
             yield DiagnosticStatus.ERROR, message
         if predictor is None or not received:
             yield DiagnosticStatus.STALE, "no samples"

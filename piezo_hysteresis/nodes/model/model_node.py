@@ -28,10 +28,11 @@ from ...acquisition.sample_block import SampleBlock
 from ...errors import PiezoError, RecordError
 from ...model.model import Model
 from ...model.model_file import load, loads
-from ...model.model_parameters import model_hash
+from ...model.model_parameters import hash_number, model_hash
+from ...online.prediction import Prediction
 from ...online.predictor import Predictor
 from ...online.warmup import compile_kernels
-from ...parameter import Parameter, Row, Setting
+from ...parameter import Row, Setting
 from ...recording.table.time_column import round_period
 from ..messages.samples import SampleReader
 from ..runtime.guarded_node import GuardedNode
@@ -42,18 +43,14 @@ from ..runtime.process import run
 from ..topics import subscribe
 from .change_reporter import CHANGE, ChangeReporter
 from .diagnostics import ModelDiagnostics
-from .publishers import ModelTopics
+from .publishers import LIVE, ModelTopics, Predicted
 from .recalibrator import Recalibrator
 from .residual_alarm import ALARM, ResidualAlarm
 from .stream_period import TOLERANCE, StreamPeriod
 
-_SOURCE = "model node"
-"""Source of the parameters of the model node."""
-
 MODEL: tuple[Row, ...] = (
     Setting("model_file", "", "path of the first model; a model on the topic `model` replaces it"),
-    Parameter("live_rate", "f_l", "Hz", 50.0, 0.1, 1000.0, "rate of the live scalars", _SOURCE),
-    Parameter("rms_time", "T_r", "s", 1.0, 1e-3, 1e4, "time over which residual_rms is taken", _SOURCE),
+    *LIVE,
     *ALARM,
     *CHANGE,
 )
@@ -73,6 +70,7 @@ class ModelNode(GuardedNode):
         self._period = StreamPeriod()
         self._reader = SampleReader()
         self._topics = ModelTopics(self)
+        self._numbered: tuple[Model, int] | None = None
         self._changes = ChangeReporter(self, self._values)
         self._diagnostics = ModelDiagnostics(self, ResidualAlarm(self._values), self._changes)
         self._recalibrator = Recalibrator(self, self._changes, self._follow)
@@ -105,9 +103,16 @@ class ModelNode(GuardedNode):
         self._diagnostics.saw(block, now(self))
         if answer.model is not None and answer.prediction.size:
             counted = block.after(answer.first)
-            self._topics.publish(counted, answer, answer.model, predictor)
+            self._publish(counted, answer, answer.model, predictor)
             self._changes.add(counted, answer, predictor)
             self._recalibrator.add(counted, answer, predictor)
+
+    def _publish(self, block: SampleBlock, answer: Prediction, model: Model, predictor: Predictor) -> None:
+        if self._numbered is None or self._numbered[0] is not model:
+            self._numbered = (model, hash_number(model))
+        results = {"prediction": answer.prediction, "residual": answer.residual}
+        predicted = Predicted(block, results, self._numbered[1], answer.warming_up, predictor.residual_rms)
+        self._topics.publish(predicted, predictor.sequence.received, predictor.sample_period)
 
     def _predictor_for(self, block: SampleBlock) -> Predictor | None:
         """The predictor of the stream. Another sample period gives a new one; None while it is unknown."""

@@ -212,7 +212,8 @@ def test_any_cloud_gives_arrays_or_our_error(fields, step, width, height, data, 
 
 def test_predicted_samples_layout():
     block = block_of(4)
-    written = PredictionWriter().write(block, block.displacement, np.zeros(4), 0xDEADBEEF, valid=False)
+    results = {"prediction": block.displacement, "residual": np.zeros(4)}
+    written = PredictionWriter().write(block, results, 0xDEADBEEF, valid=False)
     message = deserialize_message(written, PointCloud2)
     arrays = from_cloud(message, {"prediction": "f8", "residual": "f8", "model": "u4", "index": "u4"})
     assert arrays["model"].tolist() == [0xDEADBEEF] * 4

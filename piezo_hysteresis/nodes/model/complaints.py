@@ -1,0 +1,71 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`Complaints`: what a model node could not use, in the log and on /diagnostics."""
+
+from __future__ import annotations
+
+from ..runtime.guarded_node import GuardedNode
+
+_LONGEST = 500
+"""Largest number of characters of a reason that is repeated every second."""
+
+_LOG_INTERVAL = 0.1
+"""Shortest time between two lines of one kind in the log [s]: a stream of faults must not fill the disk."""
+
+
+class Complaints:
+    """The newest problem with the samples, and the reason why a model was refused.
+
+    Parameters
+    ----------
+    node : GuardedNode
+        The model node.
+
+    Attributes
+    ----------
+    count : int
+        Number of problems and refusals so far.
+    """
+
+    def __init__(self, node: GuardedNode) -> None:
+        self._node = node
+        self._problem = self._refused = ""
+        self.count = 0
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What is to be reported now."""
+        return tuple(filter(None, (self._refused, self._problem)))
+
+    def problem(self, message: str) -> None:
+        """Report a problem in one line, now and until it has been `shown`."""
+        if message[:_LONGEST] != self._problem:
+            self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
+        self._problem = message[:_LONGEST]
+        self.count += 1
+
+    def refused(self, message: str) -> None:
+        """Report why a model was refused, until another model is accepted."""
+        self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
+        self._refused = message[:_LONGEST]
+        self.count += 1
+
+    def accepted(self) -> None:
+        """A model was accepted."""
+        self._refused = ""
+
+    def shown(self) -> None:
+        """The problem was reported."""
+        self._problem = ""

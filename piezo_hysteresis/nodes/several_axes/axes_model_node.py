@@ -1,0 +1,167 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`axes_model_node`: runs a model of several axes with a stage, and publishes predictions and residuals."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter as RosParameter
+from std_srvs.srv import Trigger
+
+from ...blocks.kernel import on_compilation
+from ...errors import PiezoError, RecordError
+from ...model import axes_file
+from ...model.axes_model import AxesModel
+from ...model.model_parameters import first_bits
+from ...online.axes_joiner import AxesJoiner, JoinedBlock
+from ...online.axes_predictor import AxesPredictor
+from ...parameter import Row, Setting
+from ..model.publishers import LIVE
+from ..model.residual_alarm import ALARM
+from ..runtime.guarded_node import GuardedNode
+from ..runtime.launch_values import LISTENING
+from ..runtime.node_clock import now
+from ..runtime.parameters import declare, read
+from ..runtime.process import run
+from .axes_diagnostics import AxesDiagnostics
+from .axis_stream import AxisStream, columns, slices
+
+AXES: tuple[Row, ...] = (
+    Setting("model_file", "", "path of a model of several axes, an NPZ file of piezo identify"),
+    Setting(
+        "axes",
+        "",
+        "namespaces of the drivers in the order of the model, separated by commas; empty: that of the node, whose "
+        "`samples` hold all axes (voltage_2, displacement_2, ...)",
+    ),
+    *LIVE,
+    *ALARM,
+)
+"""Parameters of the model node of several axes."""
+
+
+class AxesModelNode(GuardedNode):
+    """Predictor of several axes: topics, services and parameters stand in docs/several_axes and docs/ros."""
+
+    def __init__(self) -> None:
+        super().__init__("axes_model_node")
+        declare(self, AXES)
+        self._values = read(self, AXES)
+        names = [part.strip() for part in self._values["axes"].split(",") if part.strip()]
+        if len(set(names)) != len(names):
+            raise RecordError(f"axes: got '{self._values['axes']}', expected every namespace once")
+        self._streams = [
+            AxisStream(self, name, partial(self._on_samples, number)) for number, name in enumerate(names or [""])
+        ]
+        self._diagnostics = AxesDiagnostics(self, [stream.name for stream in self._streams], self._values)
+        self._joiner: AxesJoiner | None = None
+        self._predictor: AxesPredictor | None = None
+        if self._values["model_file"]:
+            self._load(self._values["model_file"])
+        self.add_on_set_parameters_callback(self._check)
+        self.add_post_set_parameters_callback(self._apply)
+        self.create_service(Trigger, "~/zero", self._on_zero)
+        self.get_logger().info(LISTENING)
+
+    def _on_samples(self, number: int, message: bytes) -> None:
+        stream = self._streams[number]
+        try:
+            block = stream.read(message)
+            self._diagnostics.saw(number, block, now(self))
+            if self._joiner is None or self._predictor is None:
+                return
+            self._joiner.add(number, block)
+            for joined in self._joiner.take():
+                self._predict(joined, self._joiner, self._predictor)
+        except PiezoError as error:
+            self._diagnostics.problem(f"{stream.name}: {error}")
+
+    def _predict(self, joined: JoinedBlock, joiner: AxesJoiner, predictor: AxesPredictor) -> None:
+        answer = predictor.predict(
+            columns(joined.blocks, "voltage"),
+            columns(joined.blocks, "displacement"),
+            joined.missing,
+            restarted=joined.restarted,
+            settled=joined.is_undriven,
+            follows_gap=joined.follows_gap,
+        )
+        for stream, block, axes in zip(self._streams, joined.blocks, slices(joined.blocks), strict=True):
+            stream.publish(
+                block,
+                answer.prediction[:, axes],
+                answer.residual[:, axes],
+                predictor.residual_rms[axes.start],
+                self._number,
+                answer.warming_up,
+                joiner.joined,
+                joiner.sample_period,
+            )
+
+    def _load(self, path: str) -> None:
+        try:
+            model = axes_file.load(path)
+        except PiezoError as error:
+            self._diagnostics.refused(f"model_file: {error}")
+            return
+        self._compile(model)
+        self._number = first_bits(axes_file.content_hash(model))
+        self._predictor = AxesPredictor(model, self._values["rms_time"])
+        self._joiner = AxesJoiner(len(self._streams), model.sample_period)
+        self._diagnostics.follow(self._joiner, self._predictor)
+
+    def _compile(self, model: AxesModel) -> None:
+        """Run the kernel once, so that it is compiled before the first block."""
+        with on_compilation(lambda: self.get_logger().info("compiling the kernel, once")):
+            model.run(np.zeros((1, model.inputs)), model.rest())
+
+    def _on_zero(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = self._predictor is not None
+        response.message = "there is no model; set model_file"
+        if self._predictor is not None:
+            self._predictor.zero()
+            response.message = "the offsets are the mean residuals of the next 0.1 s of samples"
+        return response
+
+    def _check(self, parameters: list[RosParameter]) -> SetParametersResult:
+        """Read a model file before its name is accepted. The other parameters cannot be changed after the start."""
+        rows = {row.name: row for row in AXES}
+        try:
+            for parameter in parameters:
+                if parameter.name == "model_file":
+                    axes_file.load(str(rows[parameter.name].check(parameter.value)))
+                elif parameter.name in rows:
+                    raise RecordError(f"{parameter.name} is read at start; give it then")
+        except PiezoError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply(self, parameters: list[RosParameter]) -> None:
+        for parameter in parameters:
+            if parameter.name == "model_file":
+                self._load(parameter.value)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a model node of several axes; its exit code is 2 where its parameters are invalid."""
+    return run(AxesModelNode, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
