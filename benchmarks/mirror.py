@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -36,6 +37,7 @@ import numpy as np
 from benchmarks.figures import Figures, alone
 from piezo_hysteresis.identification.axes_equations import Regression, impulse_responses
 from piezo_hysteresis.identification.identify_axes import identify_axes
+from piezo_hysteresis.model.axes_model import AxesModel
 from piezo_hysteresis.model.axes_samples import columns
 from piezo_hysteresis.record import Record
 
@@ -95,6 +97,17 @@ def rms(records: Sequence[Record], predictions: Sequence[np.ndarray]) -> float:
     return 1e6 * float(np.sqrt(np.mean([(e - e.mean(axis=0)) ** 2 for e in left])))
 
 
+def speed(model: AxesModel, u: np.ndarray) -> Figures:
+    """Time of the prediction, in blocks of 10 ms as drivers send them."""
+    size = round(0.01 * RATE)
+    state, begun = model.rest(), time.perf_counter()
+    for first in range(0, len(u), size):
+        _, state = model.run(u[first : first + size], state)
+    share = (time.perf_counter() - begun) / (len(u) * model.sample_period)
+    rows = [("blocks of 10 ms", f"{100 * share:.1f} %")]
+    return Figures("Prediction of all three axes, time over the time of the stage", ("samples", "share"), rows)
+
+
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     default = os.environ.get("PIEZO_DATA", "../shared/data")
@@ -134,7 +147,8 @@ def run(options: argparse.Namespace) -> list[Figures]:
             if not error < limit
         ]
     rows.append(("", "promised: less than", *PROMISED))
-    return [Figures(title, ("part", "model", *(f"{level} mV" for level in LEVELS)), rows, tuple(failures))]
+    live = speed(model, columns(everything[0], "voltage"))
+    return [live, Figures(title, ("part", "model", *(f"{level} mV" for level in LEVELS)), rows, tuple(failures))]
 
 
 if __name__ == "__main__":

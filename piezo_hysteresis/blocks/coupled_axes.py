@@ -18,6 +18,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from .kernel import kernel
 
 
@@ -46,8 +48,9 @@ def coupled_axes(u, taps, elongation, radii, decay, reference, power, history, p
     y : (n, p) array
         Displacements of the last pass [m], the result.
     """
-    passes, outputs, length, _ = taps.shape
+    passes, outputs, length, terms = taps.shape
     inputs = u.shape[1]
+    sums = np.empty((outputs, terms))
     for k in range(u.shape[0]):
         square = 0.0
         for i in range(inputs):
@@ -68,9 +71,13 @@ def coupled_axes(u, taps, elongation, radii, decay, reference, power, history, p
                         plays[s, i, r] = min(max(plays[s, i, r], z - radii[r]), z + radii[r])
                         row[(3 + r) * inputs + i] = plays[s, i, r]
             used = row.size if s > 0 else 3 * inputs
+            sums[:] = 0.0  # one for each regressor: independent sums are computed in parallel
+            for j in range(length):
+                for o in range(outputs):
+                    for f in range(used):
+                        sums[o, f] += taps[s, o, j, f] * history[s, k + j, f]
             for o in range(outputs):
                 total = 0.0
-                for j in range(length):
-                    for f in range(used):
-                        total += taps[s, o, j, f] * history[s, k + j, f]
+                for f in range(used):
+                    total += sums[o, f]
                 y[k, o] = total

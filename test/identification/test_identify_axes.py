@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A plant of three axes, written here: a full matrix of gains behind a lag and a play in every actuator."""
+"""The matrix, the loops and the file of several axes, on the plant of `coupled_plant`."""
 
 import numpy as np
 import pytest
@@ -24,21 +24,7 @@ from piezo_hysteresis.model import axes_file
 from piezo_hysteresis.model.axes_samples import columns
 from piezo_hysteresis.record import Record
 
-GAINS = 1e-6 * np.array([[-2.8, 1.5, -3.5], [0.5, -3.5, -4.0], [-3.5, -4.5, 1.7]])
-LAG, WIDTH, SHARE = 0.5, 0.05, 0.4
-
-
-def plant(seed, share=SHARE, size=3000, gains=GAINS):
-    outputs, inputs = gains.shape
-    u = 0.2 * np.random.default_rng(seed).standard_normal((size, inputs))
-    x, h, y = np.zeros(inputs), np.zeros(inputs), np.empty((size, outputs))
-    for k in range(size):
-        x = LAG * x + (1 - LAG) * u[k]
-        h = np.clip(h, x - WIDTH, x + WIDTH)
-        y[k] = gains @ (x + share * h)
-    others = {f"{q}_{i + 1}": a[:, i] for q, a in (("voltage", u), ("displacement", y)) for i in range(1, a.shape[1])}
-    return Record(u[:, 0], y[:, 0], 1e-3, f"noise_{seed}", channels=others)
-
+from ..coupled_plant import GAINS, plant
 
 @pytest.fixture(scope="module")
 def model():

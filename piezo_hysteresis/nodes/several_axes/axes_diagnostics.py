@@ -108,7 +108,7 @@ class AxesDiagnostics:
                 "rejoined": joiner.rejoined,
                 "latency_max": self._latency,
                 "warming_up": predictor.warming_up,
-                "level": predictor.level,
+                "drive_rms": predictor.level,
             }
             for quantity, of_axes in (
                 ("offset", predictor.offset),
