@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -103,6 +103,18 @@ def axis_of(name: str) -> tuple[str, int] | None:
     """
     match = _AXIS.fullmatch(name)
     return None if match is None else (match[1], int(match[2]))
+
+
+def axes_of(channels: Iterable[str], quantity: str) -> tuple[str, ...]:
+    """Names of all channels of one quantity, the first axis first, from those besides ``voltage`` and ``displacement``.
+
+    Examples
+    --------
+    >>> axes_of(["voltage_10", "voltage_2", "displacement_2", "temperature"], "voltage")
+    ('voltage', 'voltage_2', 'voltage_10')
+    """
+    found = [(axis[1], name) for name in channels if (axis := axis_of(name)) and axis[0] == quantity]
+    return (quantity, *(name for _, name in sorted(found)))
 
 
 class ChannelMapping(Mapping[str, Samples]):

@@ -21,7 +21,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channel_mapping import axis_of
+from ..channel_mapping import axes_of
 from ..record import Record
 
 
@@ -41,13 +41,7 @@ def names(record: Record, quantity: str) -> tuple[str, ...]:
     >>> names(r, "voltage"), names(r, "displacement")
     (('voltage', 'voltage_2'), ('displacement', 'displacement_3'))
     """
-    return ordered(record.channels, quantity)
-
-
-def ordered(channels: Iterable[str], quantity: str) -> tuple[str, ...]:
-    """As `names`, from the names of the channels besides ``voltage`` and ``displacement``."""
-    found = [(axis[1], name) for name in channels if (axis := axis_of(name)) and axis[0] == quantity]
-    return (quantity, *(name for _, name in sorted(found)))
+    return axes_of(record.channels, quantity)
 
 
 def columns(record: Record, quantity: str) -> NDArray[np.float64]:

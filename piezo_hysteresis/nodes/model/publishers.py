@@ -25,7 +25,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64
 
 from ...acquisition.sample_block import SampleBlock
-from ...model.axes_samples import ordered
+from ...channel_mapping import axes_of
 from ...parameter import Parameter, Row
 from ..messages.conversions import live, to_stamp
 from ..messages.samples import PredictionWriter
@@ -117,7 +117,7 @@ class ModelTopics:
                 send(publisher, Float64(data=value))
         if not is_heard(self._live):
             return
-        voltages = ordered(block.channels, "voltage")
+        voltages = axes_of(block.channels, "voltage")
         values = {name: float(block.columns[name][-1]) for name in (*voltages, "displacement")} | newest
         stamp = to_stamp(block.stamp + round(float(block.time[-1]) * 1e9))
         send(self._live, live(stamp, block.frame, **values))

@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from rclpy.node import Node
 
 from ...acquisition.sample_block import SampleBlock
-from ...channel_mapping import axis_of
-from ...model.axes_samples import ordered
+from ...channel_mapping import axes_of, axis_of
 from ..messages.samples import SampleReader
 from ..model.publishers import ModelTopics, Predicted
 from ..topics import subscribe
@@ -68,7 +67,7 @@ class AxisStream:
     ) -> None:
         """Publish prediction and residual (n, p) of the displacements of this stream; the others as in `Predicted`."""
         results: dict[str, Array] = {}
-        for name, y, e in zip(ordered(block.channels, "displacement"), prediction.T, residual.T, strict=True):
+        for name, y, e in zip(axes_of(block.channels, "displacement"), prediction.T, residual.T, strict=True):
             number = name.removeprefix("displacement")
             results |= {f"prediction{number}": y, f"residual{number}": e}
             if number:
@@ -78,13 +77,13 @@ class AxisStream:
 
 def columns(blocks: tuple[SampleBlock, ...], quantity: str) -> Array:
     """Samples of one quantity of all streams, in the order of the streams and of their numbers, shape (n, axes)."""
-    return np.column_stack([b.columns[name] for b in blocks for name in ordered(b.channels, quantity)])
+    return np.column_stack([b.columns[name] for b in blocks for name in axes_of(b.channels, quantity)])
 
 
 def slices(blocks: tuple[SampleBlock, ...]) -> Iterator[slice]:
     """The displacements of every stream among those of all."""
     first = 0
     for block in blocks:
-        count = len(ordered(block.channels, "displacement"))
+        count = len(axes_of(block.channels, "displacement"))
         yield slice(first, first + count)
         first += count

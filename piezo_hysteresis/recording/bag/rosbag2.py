@@ -31,6 +31,7 @@ from .bag import STORAGES, Bag
 from .bag_writer import BagWriter
 from .block_message import TYPE, BlockMessage, typestore
 from .foreign_topics import read_topics
+from .joined_axes import joined
 from .phase_topic import STRING, PhaseNames
 from .recorded_phases import records_of
 from .sample_stream import SampleStream
@@ -135,12 +136,13 @@ def _space(topic: str, name: str) -> str | None:
 
 
 def _read_samples(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[Notice]]:
+    axes = [] if options.axis is None else [_absolute(part.strip()) for part in options.axis.split(",")]
     streams: dict[str, SampleStream] = {}
     names: dict[str, PhaseNames] = {}
     damaged = 0
     for message in bag.messages():
         space = _space(message.topic, "samples" if message.type == TYPE else "phase")
-        if space is None or (options.axis is not None and space != _absolute(options.axis)):
+        if space is None or (axes and space not in axes):
             continue
         try:
             if message.type == TYPE:
@@ -150,15 +152,22 @@ def _read_samples(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[No
                 names.setdefault(space, PhaseNames()).add(message.raw, message.time_ns)
         except Exception:  # the decoder raises any error on damaged bytes
             damaged += 1
-        if len(streams) > 1:
-            raise RecordingError(f"holds several stages, expected one; give `axis`: {', '.join(sorted(streams))}")
+        if len(streams) > max(1, len(axes)):
+            raise RecordingError(f"holds several stages, expected one; give `axis`: one of {', '.join(sorted(streams))}, "
+                             "or all of them with commas between for a stage of several axes")
     notices = [Notice("damaged", f"{damaged} messages could not be decoded and were skipped")] if damaged else []
-    if not streams:
-        where = f" of the axis '{options.axis}'" if options.axis else ""
+    absent = [axis for axis in axes if axis not in streams]
+    if absent or not streams:
+        where = f" of {', '.join(absent)}" if absent else ""
         raise RecordingError(
             f"got no readable samples{where} (topic 'samples', {TYPE}); map foreign topics by `columns`, e.g. "
             "voltage=/ao.data displacement=/sensor.data"
         )
+    if len(axes) > 1:
+        segment, found = joined({axis: streams[axis] for axis in axes})
+        whole = replace(options, phases="record" if options.phases is None else options.phases)
+        records, more = records_of([segment], shared_averages([segment.size], options.average), PhaseNames(), whole)
+        return records, [*notices, *found, *more]
     (space, stream), *_ = streams.items()
     segments, more_notices = stream.segments(split_phases=options.phases is None)
     averages = shared_averages([s.size for s in segments], options.average)

@@ -82,6 +82,11 @@ class SampleStream:
         """Number of samples received."""
         return len(self._index)
 
+    @property
+    def begin_ns(self) -> int:
+        """Time of the first sample that was received [ns]."""
+        return self._times_ns[0]
+
     def add(self, block: BlockMessage, received_ns: int) -> None:
         """Append a block in the order of arrival; channels that other blocks have are filled with NaN."""
         begin, n = self.size, block.phase.size

@@ -61,7 +61,8 @@ class ReadOptions:
     Parameters
     ----------
     axis : str, optional
-        Namespace of one stage in a bag that holds several, e.g. ``"/stage_x"``.
+        Namespace of one stage in a bag that holds several, e.g. ``"/stage_x"``; several with commas between are read as
+        one stage of several axes.
     columns : mapping of str to str or int
         Channel (see `is_channel`) or label (one of `LABELS`) to its place: a column number counted from 1, the name of
         a column, key or variable, or ``/topic.field[element]`` in a bag.
