@@ -180,7 +180,13 @@ def advertise_lifecycle(node: LifecycleNode, name: str) -> Any:
 
 
 def subscribe(
-    node: Node, name: str, callback: Callable[[Any], None], namespace: str = "", *, deep: bool = False, raw: bool = False
+    node: Node,
+    name: str,
+    callback: Callable[[Any], None],
+    namespace: str = "",
+    *,
+    deep: bool = False,
+    raw: bool = False,
 ) -> Any:
     """A subscription to one of `TOPICS`.
 

@@ -109,7 +109,8 @@ class AxesJoiner:
         self.joined = self.rejoined = 0
         self._streams = [_Stream(SequenceCheck(sample_period)) for _ in range(streams)]
         self._tolerance = max(1, round(LARGEST_SKEW / sample_period))
-        self._begin()
+        self._origin: tuple[int, int] | None = None
+        self._next, self._has_begun = 0, False
 
     @property
     def lost(self) -> int:
@@ -180,7 +181,7 @@ class AxesJoiner:
     def _begin(self) -> None:
         for stream in self._streams:
             stream.waiting.clear()
-        self._origin: tuple[int, int] | None = None
+        self._origin = None
         self._next, self._has_begun = 0, False
 
     def _number_at(self, time: int) -> int:

@@ -26,6 +26,7 @@ from piezo_hysteresis.record import Record
 
 from ..coupled_plant import GAINS, plant
 
+
 @pytest.fixture(scope="module")
 def model():
     return identify_axes([plant(1), plant(2)], length=20)

@@ -54,7 +54,8 @@ def times(joined):
 def test_samples_of_the_same_time_are_joined_whenever_they_arrive(streams, random):
     joiner = AxesJoiner(len(streams), PERIOD)
     arriving = [
-        [block(begin, first, size, shift=late * PERIOD) for first in range(0, 400, size)] for begin, late, size in streams
+        [block(begin, first, size, shift=late * PERIOD) for first in range(0, 400, size)]
+        for begin, late, size in streams
     ]
     joined = []
     while any(arriving):

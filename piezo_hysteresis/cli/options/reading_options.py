@@ -52,8 +52,12 @@ def add_reading_group(parser: argparse.ArgumentParser) -> None:
         choices=tuple(recording.FORMATS),
         help="format of the file (default: inferred from the path)",
     )
-    group.add_argument("--axis", metavar="NS", help="namespace of one stage in a bag of several, e.g. /stage_x; several "
-        "with commas between are one stage of several axes")
+    group.add_argument(
+        "--axis",
+        metavar="NS",
+        help="namespace of one stage in a bag of several, e.g. /stage_x; several "
+        "with commas between are one stage of several axes",
+    )
     group.add_argument(
         "--column",
         metavar="CHANNEL=PLACE",

@@ -150,9 +150,7 @@ class PredictionWriter:
     def __init__(self) -> None:
         self._writer = _GrowingWriter(PREDICTED_SAMPLES)
 
-    def write(
-        self, block: SampleBlock, results: Mapping[str, Samples], model: int, *, valid: bool = True
-    ) -> bytes:
+    def write(self, block: SampleBlock, results: Mapping[str, Samples], model: int, *, valid: bool = True) -> bytes:
         """Message for the samples of a block.
 
         Parameters

@@ -64,7 +64,7 @@ class AxesDiagnostics:
         self._joiner: AxesJoiner | None = None
         self._predictor: AxesPredictor | None = None
         self._latency, self._frame = 0.0, ""
-        self._seen = (time.monotonic(), 0, 0, 0)
+        self._seen: tuple[float, tuple[int, ...]] = (time.monotonic(), (0, 0, 0, 0))
         node.create_timer(1.0, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def problem(self, message: str) -> None:
@@ -79,9 +79,11 @@ class AxesDiagnostics:
         """Report the counters of a joiner and a predictor from now on."""
         self._complaints.accepted()
         self._joiner, self._predictor = joiner, predictor
-        self._seen = (time.monotonic(), 0, 0, 0)
+        self._seen = (time.monotonic(), (0, 0, 0, 0))
         model = predictor.model
-        self._node.get_logger().info(f"model {content_hash(model)}: {model.inputs} drives, {model.outputs} displacements")
+        self._node.get_logger().info(
+            f"model {content_hash(model)}: {model.inputs} drives, {model.outputs} displacements"
+        )
 
     def saw(self, stream: int, block: SampleBlock, now: int) -> None:
         """Record the age of a block that arrived at `now` [ns]."""
@@ -91,17 +93,16 @@ class AxesDiagnostics:
 
     def _publish(self) -> None:
         values: dict[str, object] = {"problems": self._complaints.count}
-        lost = repeated = rejoined = 0
+        new: tuple[int, ...] = (0, 0, 0, 0)
         if self._joiner is not None and self._predictor is not None:
             joiner, predictor, now = self._joiner, self._predictor, time.monotonic()
-            then, *before = self._seen
-            joined, lost, repeated = (
-                new - old for new, old in zip((joiner.joined, joiner.lost, joiner.repeated), before, strict=True)
-            )
-            self._seen = (now, joiner.joined, joiner.lost, joiner.repeated)
+            counts = joiner.joined, joiner.lost, joiner.repeated, joiner.rejoined
+            then, before = self._seen
+            new = tuple(now - then for now, then in zip(counts, before, strict=True))
+            self._seen = (now, counts)
             values |= {
                 "model": content_hash(predictor.model),
-                "rate": joined / (now - then) if now > then else 0.0,
+                "rate": new[0] / (now - then) if now > then else 0.0,
                 "received": joiner.joined,
                 "lost": joiner.lost,
                 "repeated": joiner.repeated,
@@ -117,13 +118,13 @@ class AxesDiagnostics:
             ):
                 named = {f"{quantity}_{n}" if n > 1 else quantity: value for n, value in enumerate(of_axes, 1)}
                 values |= {name: value for name, value in named.items() if value is not None}
-        findings = list(self._findings(lost, repeated)) or [(DiagnosticStatus.OK, "predicting")]
+        findings = list(self._findings(*new[1:])) or [(DiagnosticStatus.OK, "predicting")]
         level, message = max(level for level, _ in findings), "; ".join(text for _, text in findings)
         self._latency = 0.0
         self._complaints.shown()
         send(self._publisher, self._node.reported(diagnostic(level, self._name, message, self._frame, **values)))
 
-    def _findings(self, lost: int, repeated: int) -> Iterator[tuple[bytes, str]]:
+    def _findings(self, lost: int, repeated: int, rejoined: int) -> Iterator[tuple[bytes, str]]:
         clock = self._node.get_clock()
         if clock.ros_time_is_active and clock.now().nanoseconds == 0:
             yield DiagnosticStatus.WARN, "use_sim_time is true, and no message arrives on /clock"
@@ -140,6 +141,8 @@ class AxesDiagnostics:
             yield DiagnosticStatus.WARN, f"{lost} samples were lost; the voltages were held constant over the gap"
         if repeated:
             yield DiagnosticStatus.WARN, f"{repeated} samples came more than once or too late and were dropped"
+        if rejoined:
+            yield DiagnosticStatus.WARN, f"the stamps of a stream moved {rejoined} times; it was joined anew"
         predictor = self._predictor
         if predictor is None:
             yield DiagnosticStatus.WARN, "there is no model; set model_file"

@@ -153,8 +153,10 @@ def _read_samples(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[No
         except Exception:  # the decoder raises any error on damaged bytes
             damaged += 1
         if len(streams) > max(1, len(axes)):
-            raise RecordingError(f"holds several stages, expected one; give `axis`: one of {', '.join(sorted(streams))}, "
-                             "or all of them with commas between for a stage of several axes")
+            raise RecordingError(
+                f"holds several stages, expected one; give `axis`: one of {', '.join(sorted(streams))}, or all of them "
+                "with commas between for a stage of several axes"
+            )
     notices = [Notice("damaged", f"{damaged} messages could not be decoded and were skipped")] if damaged else []
     absent = [axis for axis in axes if axis not in streams]
     if absent or not streams:

@@ -39,7 +39,9 @@ from ...coupled_plant import plant
 
 pytestmark = pytest.mark.nodes
 
-FIELDS = PREDICTED_SAMPLES | {f"{name}_{n}": "f8" for name in ("displacement", "prediction", "residual") for n in (2, 3)}
+FIELDS = PREDICTED_SAMPLES | {
+    f"{name}_{n}": "f8" for name in ("displacement", "prediction", "residual") for n in (2, 3)
+}
 AXES = ("/stage_x", "/stage_y", "/stage_z")
 
 
@@ -161,7 +163,8 @@ def test_a_wrong_file_a_missing_axis_and_other_numbers_are_told_and_the_node_run
     lab.wait(lambda: reported(reports, "absent.npz: No such file"), "the missing file")
 
     def written(path):
-        request = SetParametersAtomically.Request(parameters=[Parameter("model_file", value=str(path)).to_parameter_msg()])
+        parameter = Parameter("model_file", value=str(path)).to_parameter_msg()
+        request = SetParametersAtomically.Request(parameters=[parameter])
         return lab.call(SetParametersAtomically, "axes_model_node/set_parameters_atomically", request).result
 
     (tmp_path / "one.yaml").write_text("/**: {}")
@@ -169,7 +172,11 @@ def test_a_wrong_file_a_missing_axis_and_other_numbers_are_told_and_the_node_run
     assert written(axes_file.save(model, tmp_path / "model.npz")).successful
     lab.wait(lambda: reported(reports, "no samples of /stage_x, /stage_y"), "the silent drivers")
     lab.driver(namespace="/stage_x", sample_period=1e-3)
-    status = lab.wait(lambda: [s for s in reported(reports, "no samples of /stage_y") if "_x" not in s.message], "one")[0]
+
+    def of_one():
+        return [s for s in reported(reports, "no samples of /stage_y") if "/stage_x" not in s.message]
+
+    status = lab.wait(of_one, "the driver that is still silent")[0]
     assert status.level == DiagnosticStatus.STALE
     lab.driver(namespace="/stage_y", sample_period=1e-3)
     lab.wait(lambda: reported(reports, "got 2 drives and 2 displacements, expected 3 and 3"), "the missing axis")

@@ -87,7 +87,7 @@ def test_an_axis_that_is_not_in_the_bag_and_drivers_that_never_ran_together_are_
     bag, _ = recorded(tmp_path / "bag")
     with pytest.raises(RecordingError, match="no readable samples of /stage_a"):
         read(bag, axis="/stage_x,/stage_a")
-    with pytest.raises(RecordingError, match="several stages, expected one; .* all of them with commas between"):
+    with pytest.raises(RecordingError, match=r"several stages, expected one; .* all of them with commas between"):
         read(bag)
     with BagWriter(tmp_path / "apart") as writer:
         for number, axis in enumerate(AXES[:2]):
