@@ -38,6 +38,7 @@ from piezo_hysteresis.nodes.compensation.settings import COMPENSATION
 from piezo_hysteresis.nodes.identification.settings import IDENTIFICATION
 from piezo_hysteresis.nodes.model.model_node import MODEL
 from piezo_hysteresis.nodes.page.page_node import PAGE
+from piezo_hysteresis.nodes.several_axes.axes_model_node import AXES
 from piezo_hysteresis.parameter import Parameter, Row, Setting
 from piezo_hysteresis.stage.back_ends import BACK_ENDS
 from piezo_hysteresis.stage.plant import PlantParameters
@@ -171,6 +172,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "driver": driver,
     "in_force": lambda: settings(replace(row, name=f"in_force.{row.name}") for row in IN_FORCE),
     "model_node": lambda: settings(MODEL),
+    "axes_model_node": lambda: settings(AXES),
     "identification_node": lambda: settings(IDENTIFICATION),
     "compensation_node": lambda: settings(COMPENSATION),
     "page_node": lambda: settings(PAGE),
