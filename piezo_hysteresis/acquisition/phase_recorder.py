@@ -125,9 +125,10 @@ def _records(blocks: list[SampleBlock], name: str, period: float, average: int, 
             pieces.append([block])
     records: list[Record] = []
     for piece in pieces:
+        further = [name for name in piece[0].channels if all(name in block.channels for block in piece)]
         voltage, displacement, *others = (
             np.concatenate([block.columns[channel] for block in piece])
-            for channel in ("voltage", "displacement", *piece[0].channels)
+            for channel in ("voltage", "displacement", *further)
         )
         record = Record(
             voltage,
@@ -136,7 +137,7 @@ def _records(blocks: list[SampleBlock], name: str, period: float, average: int, 
             name,
             start_time=int(piece[0].index[0]) * period,
             continues=continues or bool(records),
-            channels=dict(zip(piece[0].channels, others, strict=True)),
+            channels=dict(zip(further, others, strict=True)),
         )
         records.append(record.decimate(average) if 1 < average <= record.size else record)
     return records

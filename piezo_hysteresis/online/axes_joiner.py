@@ -30,8 +30,8 @@ LARGEST_SKEW = 1e-3
 LONGEST_WAIT = 2.0
 """Length of the samples of a stream that wait for the other streams [s]; older ones are dropped."""
 
-PERIOD_TOLERANCE = 0.01
-"""Largest relative difference of the sample periods of two streams."""
+PERIOD_TOLERANCE = 1e-3
+"""Largest relative difference of the sample periods of a stream and of the model, as in the identification."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

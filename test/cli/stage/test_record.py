@@ -37,6 +37,7 @@ STAGE = """
     simulated:
       seed: 3
       memory: {memory}
+      environment.thermometer: 1
 """
 
 
@@ -56,6 +57,7 @@ def test_a_protocol_is_recorded_phase_by_phase(piezo, tmp_path, memory):
     np.testing.assert_allclose(played, planned_voltage, atol=1e-3)
     assert all(record.continues for record in got[1:])
     assert not got[0].continues
+    assert all(record.channels["temperature"].size == record.size for record in got)
 
 
 @pytest.mark.parametrize(
