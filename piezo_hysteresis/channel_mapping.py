@@ -33,7 +33,7 @@ QUANTITIES: Mapping[str, str] = {"voltage": "V", "displacement": "m", "temperatu
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
 """Valid channel names: words of lower-case letters and digits."""
-_AXIS = re.compile(r"(voltage|displacement)_(\d+)")
+_AXIS = re.compile(r"(voltage|displacement)_(\d{1,6})")
 """Channel of a further axis."""
 
 

@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
+from ..channel_mapping import are_finite, quantity_of
 from ..errors import PiezoError, StageError
 from ..record import Record
 from ..stage.stage import Samples
@@ -125,19 +126,21 @@ def _records(blocks: list[SampleBlock], name: str, period: float, average: int, 
             pieces.append([block])
     records: list[Record] = []
     for piece in pieces:
-        further = [name for name in piece[0].channels if all(name in block.channels for block in piece)]
-        voltage, displacement, *others = (
-            np.concatenate([block.columns[channel] for block in piece])
-            for channel in ("voltage", "displacement", *further)
-        )
         record = Record(
-            voltage,
-            displacement,
+            np.concatenate([block.voltage for block in piece]),
+            np.concatenate([block.displacement for block in piece]),
             period,
             name,
             start_time=int(piece[0].index[0]) * period,
             continues=continues or bool(records),
-            channels=dict(zip(further, others, strict=True)),
+            channels=_further(piece),
         )
         records.append(record.decimate(average) if 1 < average <= record.size else record)
     return records
+
+
+def _further(piece: list[SampleBlock]) -> dict[str, Samples]:
+    """Channels that every block has and that a record can hold: finite, with a quantity in the name."""
+    names = [n for n in piece[0].channels if quantity_of(n) and all(n in block.channels for block in piece)]
+    channels = {name: np.concatenate([block.channels[name] for block in piece]) for name in names}
+    return {name: values for name, values in channels.items() if are_finite(values)}

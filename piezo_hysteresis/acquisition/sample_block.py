@@ -99,7 +99,7 @@ class SampleBlock:
     @property
     def columns(self) -> dict[str, NDArray]:
         """Arrays by field name of the topic `samples`."""
-        return {**{name: getattr(self, name) for name in _COLUMNS}, **self.channels}
+        return {**self.channels, **{name: getattr(self, name) for name in _COLUMNS}}
 
     def after(self, count: int) -> SampleBlock:
         """The block without its first `count` samples."""

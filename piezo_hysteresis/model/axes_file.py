@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import hashlib
 import zipfile
+import zlib
 from dataclasses import fields
 from pathlib import Path
 
@@ -31,6 +32,9 @@ _NAMES = tuple(f.name for f in fields(AxesModel) if f.init)
 
 _NUMBERS = ("sample_period", "reference", "memory", "level_max")
 """Keys with one number."""
+
+_DAMAGED = (ValueError, TypeError, EOFError, MemoryError, NotImplementedError, RuntimeError, zlib.error)
+"""Exceptions of a reader of NPZ files on damaged ones."""
 
 _OPTIONAL = ("level_max", "free_run_error")
 """Keys that files of earlier versions do not have."""
@@ -74,21 +78,22 @@ def load(path: str | Path) -> AxesModel:
             if missing := [name for name in _NAMES if name not in file and name not in _OPTIONAL]:
                 raise ModelError(f"{path}: got an NPZ file without '{missing[0]}', {expected}")
             values = {name: file[name] for name in _NAMES if name in file}
-        numbers = {name: float(value) for name, value in values.items() if name in _NUMBERS}
+        model = AxesModel(**values | {name: float(value) for name, value in values.items() if name in _NUMBERS})
     except OSError as error:
         raise ModelError(f"{path}: {error.strerror or error}, {expected}") from None
     except zipfile.BadZipFile:
         raise ModelError(f"{path}: got no NPZ file, {expected}") from None
     except ModelError:
         raise
-    except (ValueError, TypeError) as error:
+    except _DAMAGED as error:
         raise ModelError(f"{path}: damaged ({error}), {expected}") from None
-    return AxesModel(**values | numbers)
+    return model
 
 
 def content_hash(model: AxesModel) -> str:
     """``sha256:`` and 16 digits of every number that a prediction depends on."""
     digest = hashlib.sha256()
     for name in (name for name in _NAMES if name not in _OPTIONAL):
-        digest.update(np.asarray(getattr(model, name), dtype="<f8").tobytes())
+        values = np.asarray(getattr(model, name), dtype="<f8")
+        digest.update(repr(values.shape).encode() + values.tobytes())
     return f"sha256:{digest.hexdigest()[:16]}"

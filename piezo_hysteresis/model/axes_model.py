@@ -29,6 +29,12 @@ Array = NDArray[np.float64]
 LINEAR_TERMS = 3
 """Regressors of a drive without hysteresis: u, A u and A² u."""
 
+LONGEST_TIME = 1e3
+"""Largest sample period and time constant [s]."""
+
+MOST_SAMPLES = 1e6
+"""Largest time constant [sample periods]."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class AxesState:
@@ -76,7 +82,7 @@ class AxesModel:
     level_max : float
         Largest running rms of the drives that was identified [V]; infinite if it is not known.
     free_run_error : (p,) array_like
-        RMS error in free run [m], as `piezo identify` prints it; empty if it is not known.
+        RMS error in free run of the records that were not fitted [m], or of those that were; empty if it is not known.
 
     Raises
     ------
@@ -101,9 +107,11 @@ class AxesModel:
             if not np.isfinite(value).all():
                 raise ModelError(f"{name}: got numbers that are not finite, expected a model of `piezo identify`")
             object.__setattr__(self, name, value)
-        for name in ("sample_period", "reference", "memory"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ModelError(f"{name}: got {getattr(self, name)!r}, expected a positive number")
+        for name, most in (("sample_period", LONGEST_TIME), ("reference", np.inf), ("memory", LONGEST_TIME)):
+            if not (np.isfinite(getattr(self, name)) and 0 < getattr(self, name) <= most):
+                raise ModelError(f"{name}: got {getattr(self, name)!r}, expected a positive number, at most {most:g}")
+        if self.memory > MOST_SAMPLES * self.sample_period:
+            raise ModelError(f"memory: got {self.memory:g} s, expected at most {MOST_SAMPLES:g} sample periods")
         if not self.level_max > 0:
             raise ModelError(f"level_max: got {self.level_max!r}, expected a positive number")
         if self.elongation.ndim != 2 or self.radii.ndim != 1:
@@ -115,6 +123,8 @@ class AxesModel:
                 f"taps: got shape {self.taps.shape}, expected (passes, {wanted[0]}, length, {wanted[1]}) "
                 f"and {outputs} zeros for {inputs} drives and {outputs} displacements"
             )
+        if self.taps.size == 0 or (self.radii < 0).any() or (self.free_run_error < 0).any():
+            raise ModelError("taps, radii, free_run_error: expected at least one tap and no negative width or error")
         if self.free_run_error.shape not in ((0,), (outputs,)):
             raise ModelError(f"free_run_error: got shape {self.free_run_error.shape}, expected ({outputs},)")
         object.__setattr__(self, "_decay", float(np.exp(-self.sample_period / self.memory)))

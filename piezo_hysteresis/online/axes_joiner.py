@@ -22,16 +22,20 @@ from dataclasses import dataclass, field
 
 from ..acquisition.sample_block import SampleBlock
 from ..errors import RecordError
-from .sequence_check import LONGEST_DELAY, SequenceCheck
+from .sequence_check import SequenceCheck
 
-LARGEST_SKEW = 1e-3
-"""Difference between stamp and index above which a stream is joined anew [s]; drivers correct their stamps likewise."""
+LARGEST_SKEW = 2e-3
+"""Change of the stamps of a stream against those of another, above which all are joined anew [s]; at least a sample.
+Drivers correct their stamps by 1 ms."""
 
 LONGEST_WAIT = 2.0
 """Length of the samples of a stream that wait for the other streams [s]; older ones are dropped."""
 
 PERIOD_TOLERANCE = 1e-3
 """Largest relative difference of the sample periods of a stream and of the model, as in the identification."""
+
+SINGLE_TOLERANCE = 0.3
+"""As `PERIOD_TOLERANCE`, for blocks of one sample, whose stamps are less regular."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -45,7 +49,7 @@ class JoinedBlock:
     missing : int
         Number of samples before it that did not arrive from every stream.
     restarted : bool
-        True for the first block, and after the clock of the streams was set back.
+        True for the first block, and after the streams were joined anew.
     """
 
     blocks: tuple[SampleBlock, ...]
@@ -54,8 +58,8 @@ class JoinedBlock:
 
     @property
     def follows_gap(self) -> bool:
-        """True where the missing samples were never measured."""
-        return any(block.follows_gap for block in self.blocks)
+        """True where no stream measured the missing samples."""
+        return all(block.follows_gap for block in self.blocks)
 
     @property
     def is_undriven(self) -> bool:
@@ -68,23 +72,42 @@ class _Stream:
     """One stream: samples that wait for the others, each block with the number of its first sample."""
 
     check: SequenceCheck
-    end: int = 0
     waiting: deque[tuple[int, SampleBlock]] = field(default_factory=deque)
+    count: int = 0
+    end: int | None = None
+    skew: float = 0.0
+    newest: tuple[int, int] | None = None
+
+    def add(self, first: int, block: SampleBlock, most: int) -> None:
+        """Append a block, and drop old ones beyond a number of samples; the new one stays."""
+        self.waiting.append((first, block))
+        self.count += block.size
+        self.end = first + block.size
+        while len(self.waiting) > 1 and self.count - self.waiting[0][1].size >= most:
+            self.count -= self.waiting.popleft()[1].size
 
     def drop_before(self, number: int) -> None:
         """Drop the samples before a number."""
         while self.waiting and self.waiting[0][0] < number:
             first, block = self.waiting.popleft()
-            if first + block.size > number:
-                self.waiting.appendleft((number, block.between(number - first, block.size)))
+            dropped = min(block.size, number - first)
+            self.count -= dropped
+            if dropped < block.size:
+                self.waiting.appendleft((number, block.between(dropped, block.size)))
+
+    def forget(self) -> None:
+        """Drop all samples, and the relation to the other streams."""
+        self.waiting.clear()
+        self.count, self.end = 0, None
 
 
 class AxesJoiner:
     """Numbers the samples of all streams by their time, and returns those that every stream has.
 
-    Inside a stream the running index numbers the samples. The stamps relate the streams: at the beginning, after a
-    restart, and where stamp and index come to differ by more than `LARGEST_SKEW` and one sample. Two streams are
-    therefore joined as exactly as their stamps are, and to half a sample at best.
+    The stamps relate the streams where they begin; from there on, the running index numbers the samples. All streams
+    are joined anew if one is restarted, or if its stamps move against those of another by more than `LARGEST_SKEW` and
+    one sample. Two streams are joined as exactly as their stamps are, and to half a sample at best. The stamps of a
+    single stream do not matter.
 
     Parameters
     ----------
@@ -95,8 +118,11 @@ class AxesJoiner:
 
     Attributes
     ----------
-    joined, rejoined : int
-        Number of joined samples, and how often a stream was joined anew because its stamps had moved.
+    joined : int
+        Number of joined samples.
+    moves : list of (int, float)
+        Stream whose stamps had moved, and by how much [s], for every time that the streams were joined anew for this
+        reason; whoever reports them clears the list.
 
     Raises
     ------
@@ -105,12 +131,11 @@ class AxesJoiner:
     """
 
     def __init__(self, streams: int, sample_period: float) -> None:
-        self.sample_period = sample_period
-        self.joined = self.rejoined = 0
+        self.sample_period, self.joined = sample_period, 0
+        self.moves: list[tuple[int, float]] = []
         self._streams = [_Stream(SequenceCheck(sample_period)) for _ in range(streams)]
-        self._tolerance = max(1, round(LARGEST_SKEW / sample_period))
-        self._origin: tuple[int, int] | None = None
-        self._next, self._has_begun = 0, False
+        self._origin: int | None = None
+        self._next: int | None = None
 
     @property
     def lost(self) -> int:
@@ -121,6 +146,13 @@ class AxesJoiner:
     def repeated(self) -> int:
         """Number of samples of all streams that came twice or too late."""
         return sum(stream.check.repeated for stream in self._streams)
+
+    @property
+    def apart(self) -> float:
+        """Time between the newest samples of the streams, by their stamps [s]; 0 where one has none."""
+        ends = [stream.end for stream in self._streams]
+        known = [end for end in ends if end is not None]
+        return (max(known) - min(known)) * self.sample_period if len(known) == len(ends) else 0.0
 
     def add(self, number: int, block: SampleBlock) -> None:
         """Append the next block of a stream.
@@ -137,33 +169,30 @@ class AxesJoiner:
         RecordError
             If it has another sample period; the block is then treated as lost.
         """
-        period = block.sample_period
-        if period is not None and abs(period / self.sample_period - 1.0) > PERIOD_TOLERANCE:
-            raise RecordError(
-                f"samples: got the sample period {period:g} s, expected {self.sample_period:g} s as the model has"
-            )
         stream = self._streams[number]
+        self._require_period(stream, block)
         arrival = stream.check.join(int(block.index[0]), _time(block), block.size, block.follows_gap)
         block = block.after(arrival.repeated)
         if not block.size:
             return
-        by_index, by_time = stream.end + arrival.missing, self._number_at(_time(block))
-        if arrival.restarted and by_time < self._next - round(LONGEST_DELAY / self.sample_period):
+        time = _time(block)
+        if arrival.restarted and self._origin is not None and stream.end is not None:
             self._begin()
-            by_time = self._number_at(_time(block))
-        moved = abs(by_index - by_time) > self._tolerance
-        self.rejoined += moved and not arrival.restarted
-        first = by_time if arrival.restarted or moved else by_index
-        if number == 0:
-            self._origin = (first, _time(block))
-        stream.waiting.append((first, block))
-        stream.end = first + block.size
-        stream.drop_before(stream.end - round(LONGEST_WAIT / self.sample_period))
+        first = self._number_at(time) if stream.end is None else stream.end + arrival.missing
+        skew = self._skew(time, first)
+        move = self._move(number, skew)
+        if abs(move) > max(LARGEST_SKEW, self.sample_period):
+            self.moves.append((number, move))
+            self._begin()
+            first = self._number_at(time)
+            skew = self._skew(time, first)
+        stream.skew = skew
+        stream.add(first, block, round(LONGEST_WAIT / self.sample_period))
 
     def take(self) -> Iterator[JoinedBlock]:
         """The samples that every stream has by now, in blocks without a gap; they are returned once."""
         while all(stream.waiting for stream in self._streams):
-            first = max(self._next, *(stream.waiting[0][0] for stream in self._streams))
+            first = max(stream.waiting[0][0] for stream in self._streams)
             for stream in self._streams:
                 stream.drop_before(first)
             fronts = [stream.waiting[0] for stream in self._streams if stream.waiting]
@@ -173,23 +202,42 @@ class AxesJoiner:
             parts = tuple(block.between(0, size) for _, block in fronts)
             for stream in self._streams:
                 stream.drop_before(first + size)
-            restarted, missing = not self._has_begun, first - self._next if self._has_begun else 0
-            self._next, self._has_begun = first + size, True
+            restarted, missing = self._next is None, 0 if self._next is None else first - self._next
+            self._next = first + size
             self.joined += size
             yield JoinedBlock(parts, missing, restarted)
 
     def _begin(self) -> None:
         for stream in self._streams:
-            stream.waiting.clear()
-        self._origin = None
-        self._next, self._has_begun = 0, False
+            stream.forget()
+        self._origin = self._next = None
 
     def _number_at(self, time: int) -> int:
         """Number of the sample at a time [ns]; the first time that is asked for gets 0."""
         if self._origin is None:
-            self._origin = (0, time)
-        number, at = self._origin
-        return number + round((time - at) * 1e-9 / self.sample_period)
+            self._origin = time
+        return round((time - self._origin) * 1e-9 / self.sample_period)
+
+    def _skew(self, time: int, number: int) -> float:
+        """Time of a sample after that of its number [s]."""
+        return 0.0 if self._origin is None else (time - self._origin) * 1e-9 - number * self.sample_period
+
+    def _move(self, number: int, skew: float) -> float:
+        """How much further the stamps of a stream have moved than those of another one, at most [s]."""
+        others = [s.skew for k, s in enumerate(self._streams) if k != number and s.end is not None]
+        return max((skew - other for other in others), key=abs, default=0.0)
+
+    def _require_period(self, stream: _Stream, block: SampleBlock) -> None:
+        """Refuse another sample period; that of single samples follows from the time since the block before."""
+        period, tolerance = block.sample_period, PERIOD_TOLERANCE
+        newest, stream.newest = stream.newest, (int(block.index[0]), _time(block))
+        if period is None and newest is not None:
+            steps, elapsed = (int(block.index[0]) - newest[0]) % 2**32, (_time(block) - newest[1]) * 1e-9
+            if steps < 2**31 and elapsed > 0:
+                period = elapsed / max(steps, 1)
+                tolerance = max(SINGLE_TOLERANCE, LARGEST_SKEW / self.sample_period)
+        if period is not None and abs(period / self.sample_period - 1.0) > tolerance:
+            raise RecordError(f"got the sample period {period:g} s, expected {self.sample_period:g} s as the model has")
 
 
 def _time(block: SampleBlock) -> int:

@@ -95,7 +95,7 @@ class AxesPredictor:
 
     @property
     def level(self) -> float:
-        """Running rms of the drives [V]."""
+        """Running rms of the drives after the newest sample [V]."""
         return float(np.sqrt(self._state.power[0]))
 
     def zero(self) -> None:
@@ -173,7 +173,8 @@ class AxesPredictor:
         self._state, self._last, self.warming_up = self.model.rest(), u[0].copy(), False
         if u[0].any():
             self._hold(self.model.settling)
-        if not (settled and np.ptp(u, axis=0).max() <= HELD * self.model.reference):
+        is_held = len(u) > 1 and np.ptp(u, axis=0).max() <= HELD * self.model.reference
+        if not (settled and is_held):
             self._forget()
         self.zero()
 

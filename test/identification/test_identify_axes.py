@@ -101,6 +101,40 @@ def test_invalid_records_and_files_are_refused(model, tmp_path):
         axes_file.load(tmp_path / "broken.npz")
 
 
+@pytest.mark.parametrize(
+    ("changed", "reason"),
+    [
+        ({"taps": np.array(["a", "b"])}, "could not convert"),
+        ({"taps": np.zeros((3, 3, 0, 18))}, "at least one tap"),
+        ({"radii": [-1.0, 0.2, 0.8]}, "no negative width"),
+        ({"memory": 1e9}, "memory: got"),
+        ({"sample_period": 0.0}, "sample_period: got 0.0"),
+        ({"free_run_error": [1e-9]}, r"free_run_error: got shape \(1,\)"),
+        ({"level_max": np.nan}, "level_max: got nan"),
+    ],
+)
+def test_a_file_with_impossible_numbers_is_refused(model, tmp_path, changed, reason):
+    held = dict(np.load(axes_file.save(model, tmp_path / "model.npz")))
+    np.savez(tmp_path / "model.npz", **held | changed)
+    with pytest.raises(ModelError, match=reason):
+        axes_file.load(tmp_path / "model.npz")
+
+
+def test_a_file_of_an_earlier_version_has_no_level_and_no_error(model, tmp_path):
+    held = dict(np.load(axes_file.save(model, tmp_path / "model.npz")))
+    del held["level_max"], held["free_run_error"]
+    np.savez(tmp_path / "model.npz", **held)
+    again = axes_file.load(tmp_path / "model.npz")
+    assert again.level_max == np.inf
+    assert again.free_run_error.size == 0
+    assert axes_file.content_hash(again) == axes_file.content_hash(model)
+
+
+def test_the_largest_level_is_that_of_the_records(model):
+    u = columns(plant(1), "voltage")
+    assert 0.2 < model.level_max < 1.5 * float(np.sqrt(np.mean(u**2)))
+
+
 def test_the_command_identifies_and_validates_a_recording(tmp_path, capsys):
     for seed in (1, 2):
         r = plant(seed)
@@ -113,5 +147,8 @@ def test_the_command_identifies_and_validates_a_recording(tmp_path, capsys):
         )
     files = [str(tmp_path / f"0{seed}_noise.npz") for seed in (1, 2)]
     assert main(["identify", *files, "--taps", "20", "-o", str(tmp_path / "m.npz")]) == 0
+    errors = axes_errors(axes_file.load(tmp_path / "m.npz"), [plant(1), plant(2)])
+    mean = [np.sqrt(np.mean([e.rms**2 for e in errors[axis::3]])) for axis in range(3)]
+    assert axes_file.load(tmp_path / "m.npz").free_run_error == pytest.approx(mean)
     assert main(["validate", str(tmp_path / "m.npz"), *files]) == 0
     assert "displacement_3" in capsys.readouterr().out

@@ -14,6 +14,8 @@
 
 """Streams of several drivers are joined by their times, whatever is lost, late or restarted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -68,7 +70,8 @@ def test_samples_of_the_same_time_are_joined_whenever_they_arrive(streams, rando
     begin = max(begin for begin, _, _ in streams)
     assert abs(len(together) - (min(b + -(-400 // s) * s for b, _, s in streams) - begin)) <= 1
     assert [one.restarted for one in joined] == [True] + [False] * (len(joined) - 1)
-    assert joiner.lost == joiner.rejoined == 0
+    assert joiner.lost == 0
+    assert not joiner.moves
     assert joiner.joined == len(together)
 
 
@@ -107,8 +110,9 @@ def test_a_driver_that_restarts_is_joined_again_by_its_time():
             joiner.add(1, block(750, first - 700, 100))
         joined += joiner.take()
     assert np.abs(np.diff(times(joined), axis=1)).max() < 1e-6
-    assert [one.missing for one in joined if one.missing] == [250]
-    assert joiner.rejoined == 0
+    assert [one.restarted for one in joined].count(True) == 2
+    assert joiner.joined == 500 + 200  # the block of the other that waited is dropped
+    assert not joiner.moves
 
 
 @pytest.mark.parametrize("shift", [0.5, 3.0])
@@ -121,7 +125,85 @@ def test_a_stamp_that_moves_counts_once_it_contradicts_the_index(shift):
         joined += joiner.take()
     skew = np.diff(times(joined), axis=1)[-1, 0]
     assert skew == pytest.approx(0.0 if shift < 1.0 else -shift * LARGEST_SKEW / PERIOD, abs=1e-6)
-    assert joiner.rejoined == (shift > 1.0)
+    assert [number for number, _ in joiner.moves] == ([1] if shift > 1.0 else [])
+    assert [one.restarted for one in joined].count(True) == 1 + (shift > 1.0)
+
+
+@pytest.mark.parametrize("jump", [-3600.0, -0.5, 0.5])
+@pytest.mark.parametrize("streams", [1, 2])
+def test_a_clock_that_is_set_stops_nothing(streams, jump):
+    joiner = AxesJoiner(streams, PERIOD)
+    joined = []
+    for first in range(0, 20_000, 100):
+        for number in range(streams):
+            joiner.add(number, block(0, first, 100, shift=jump if first >= 10_000 else 0.0))
+        joined += joiner.take()
+    together = times(joined)
+    assert (together == together[:, :1]).all()
+    assert len(together) == 20_000
+    assert [n for n, one in enumerate(joined) if one.restarted] == ([0] if streams == 1 else [0, 100])
+    assert not any(one.missing for one in joined)
+
+
+def test_the_stamps_of_a_single_stream_do_not_matter():
+    joiner = AxesJoiner(1, PERIOD)
+    joined = []
+    jitter = np.random.default_rng(1).exponential(1e-3, 1000)
+    for number, late in enumerate(jitter):
+        joiner.add(0, block(0, 50 * number, 50, shift=late))
+        joined += joiner.take()
+    assert joiner.joined == 50_000
+    assert not any(one.missing for one in joined)
+
+
+def test_long_blocks_are_joined_whole():
+    joiner = AxesJoiner(2, PERIOD)
+    size = round(1.5 * LONGEST_WAIT / PERIOD)
+    joined = []
+    for first in range(0, 4 * size, size):
+        for number in range(2):
+            joiner.add(number, block(0, first, size))
+        joined += joiner.take()
+    assert joiner.joined == 4 * size
+
+
+def test_a_pause_of_one_stream_does_not_vouch_for_the_other():
+    joiner = AxesJoiner(2, PERIOD)
+    joined = []
+    for first in range(0, 600, 100):
+        joiner.add(0, block(0, first, 100))
+        if first not in (200, 300):
+            joiner.add(1, replace(block(0, first, 100), follows_gap=first == 400))
+        joined += joiner.take()
+    (after,) = [one for one in joined if one.missing]
+    assert not after.follows_gap
+    assert (np.diff(times(joined), axis=1) == 0).all()
+
+
+def test_single_samples_of_another_period_are_refused():
+    joiner = AxesJoiner(1, 100 * PERIOD)
+    joiner.add(0, block(0, 0, 1))
+    joiner.add(0, replace(block(100, 0, 1), index=np.array([1], np.uint32)))
+    with pytest.raises(RecordError, match=r"got the sample period 0\.02 s, expected 0\.01 s"):
+        joiner.add(0, replace(block(300, 0, 1), index=np.array([2], np.uint32)))
+
+
+def test_a_stream_whose_clock_stands_costs_no_memory():
+    joiner = AxesJoiner(2, PERIOD)
+    for first in range(0, 100_000, 100):
+        joiner.add(1, block(0, first, 100, shift=-first * PERIOD))
+    assert joiner._streams[1].count == sum(b.size for _, b in joiner._streams[1].waiting) <= LONGEST_WAIT / PERIOD
+
+
+def test_a_late_block_does_not_stop_a_bag_that_is_played_again():
+    joiner = AxesJoiner(2, PERIOD)
+    joined = []
+    order = [(number, first) for first in range(0, 30_000, 1000) for number in range(2)]
+    late = [*order[:-1], (0, 0), order[-1], *order[1:]]
+    for number, first in late:
+        joiner.add(number, block(0, first, 1000))
+        joined += joiner.take()
+    assert joiner.joined >= 58_000
 
 
 def test_a_bag_that_is_played_again_begins_anew():

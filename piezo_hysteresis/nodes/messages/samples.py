@@ -193,4 +193,4 @@ class _GrowingWriter:
 
 
 def _with(layout: Mapping[str, str], further: Iterable[str]) -> dict[str, str]:
-    return {**layout, **dict.fromkeys(further, "f8")}
+    return {**layout, **{name: "f8" for name in further if name not in layout}}

@@ -21,12 +21,15 @@ from ..runtime.guarded_node import GuardedNode
 _LONGEST = 500
 """Largest number of characters of a reason that is repeated every second."""
 
+_MOST = 8
+"""Largest number of different problems that are reported together."""
+
 _LOG_INTERVAL = 0.1
 """Shortest time between two lines of one kind in the log [s]: a stream of faults must not fill the disk."""
 
 
 class Complaints:
-    """The newest problem with the samples, and the reason why a model was refused.
+    """Problems with the samples since the last report, and the reason why a model was refused.
 
     Parameters
     ----------
@@ -41,20 +44,21 @@ class Complaints:
 
     def __init__(self, node: GuardedNode) -> None:
         self._node = node
-        self._problem = self._refused = ""
+        self._problems: list[str] = []
+        self._refused = ""
         self.count = 0
 
     @property
     def messages(self) -> tuple[str, ...]:
         """What is to be reported now."""
-        return tuple(filter(None, (self._refused, self._problem)))
+        return tuple(filter(None, (self._refused, *self._problems)))
 
     def problem(self, message: str) -> None:
         """Report a problem in one line, now and until it has been `shown`."""
-        if message[:_LONGEST] != self._problem:
-            self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
-        self._problem = message[:_LONGEST]
         self.count += 1
+        if message[:_LONGEST] not in self._problems and len(self._problems) < _MOST:
+            self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
+            self._problems.append(message[:_LONGEST])
 
     def refused(self, message: str) -> None:
         """Report why a model was refused, until another model is accepted."""
@@ -67,5 +71,5 @@ class Complaints:
         self._refused = ""
 
     def shown(self) -> None:
-        """The problem was reported."""
-        self._problem = ""
+        """The problems were reported."""
+        self._problems = []

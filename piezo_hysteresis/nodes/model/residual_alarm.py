@@ -64,8 +64,8 @@ class ResidualAlarm:
         self._warn, self._error = float(values["residual_warn"]), float(values["residual_error"])
 
     def finding(self, rms: float | None, free_run_error: float | None) -> tuple[bytes, str] | None:
-        """Level and message of an alarm; None where there is none, or one of the two values [m] is unknown."""
-        if rms is None or free_run_error is None or rms <= self._warn * free_run_error:
+        """Level and message of an alarm; None where there is none, or one of the two values [m] is unknown or 0."""
+        if rms is None or not free_run_error or rms <= self._warn * free_run_error:
             return None
         level = DiagnosticStatus.ERROR if rms > self._error * free_run_error else DiagnosticStatus.WARN
         return level, f"the residual is {rms / free_run_error:.3g} times the free-run error of the model"

@@ -63,8 +63,9 @@ class AxesDiagnostics:
         self._newest = [-math.inf] * len(streams)
         self._joiner: AxesJoiner | None = None
         self._predictor: AxesPredictor | None = None
-        self._latency, self._frame = 0.0, ""
-        self._seen: tuple[float, tuple[int, ...]] = (time.monotonic(), (0, 0, 0, 0))
+        self._latency = self._level = 0.0
+        self._frame, self._joinings = "", 0
+        self._seen: tuple[float, tuple[int, ...]] = (time.monotonic(), (0, 0, 0))
         node.create_timer(1.0, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def problem(self, message: str) -> None:
@@ -78,12 +79,16 @@ class AxesDiagnostics:
     def follow(self, joiner: AxesJoiner, predictor: AxesPredictor) -> None:
         """Report the counters of a joiner and a predictor from now on."""
         self._complaints.accepted()
-        self._joiner, self._predictor = joiner, predictor
-        self._seen = (time.monotonic(), (0, 0, 0, 0))
+        self._joiner, self._predictor, self._joinings = joiner, predictor, 0
+        self._seen = (time.monotonic(), (0, 0, 0))
         model = predictor.model
         self._node.get_logger().info(
             f"model {content_hash(model)}: {model.inputs} drives, {model.outputs} displacements"
         )
+
+    def reached(self, level: float) -> None:
+        """Record the running rms of the drives after a block [V]."""
+        self._level = max(self._level, level)
 
     def saw(self, stream: int, block: SampleBlock, now: int) -> None:
         """Record the age of a block that arrived at `now` [ns]."""
@@ -93,23 +98,24 @@ class AxesDiagnostics:
 
     def _publish(self) -> None:
         values: dict[str, object] = {"problems": self._complaints.count}
-        new: tuple[int, ...] = (0, 0, 0, 0)
+        new: tuple[int, ...] = (0, 0, 0)
         if self._joiner is not None and self._predictor is not None:
             joiner, predictor, now = self._joiner, self._predictor, time.monotonic()
-            counts = joiner.joined, joiner.lost, joiner.repeated, joiner.rejoined
+            counts = joiner.joined, joiner.lost, joiner.repeated
             then, before = self._seen
             new = tuple(now - then for now, then in zip(counts, before, strict=True))
             self._seen = (now, counts)
+            self._joinings += len(joiner.moves)
             values |= {
                 "model": content_hash(predictor.model),
                 "rate": new[0] / (now - then) if now > then else 0.0,
                 "received": joiner.joined,
                 "lost": joiner.lost,
                 "repeated": joiner.repeated,
-                "rejoined": joiner.rejoined,
+                "rejoined": self._joinings,
                 "latency_max": self._latency,
                 "warming_up": predictor.warming_up,
-                "drive_rms": predictor.level,
+                "drive_rms": self._level,
             }
             for quantity, of_axes in (
                 ("offset", predictor.offset),
@@ -118,13 +124,13 @@ class AxesDiagnostics:
             ):
                 named = {f"{quantity}_{n}" if n > 1 else quantity: value for n, value in enumerate(of_axes, 1)}
                 values |= {name: value for name, value in named.items() if value is not None}
-        findings = list(self._findings(*new[1:])) or [(DiagnosticStatus.OK, "predicting")]
+        findings = list(self._findings(*new)) or [(DiagnosticStatus.OK, "predicting")]
         level, message = max(level for level, _ in findings), "; ".join(text for _, text in findings)
-        self._latency = 0.0
+        self._latency = self._level = 0.0
         self._complaints.shown()
         send(self._publisher, self._node.reported(diagnostic(level, self._name, message, self._frame, **values)))
 
-    def _findings(self, lost: int, repeated: int, rejoined: int) -> Iterator[tuple[bytes, str]]:
+    def _findings(self, joined: int, lost: int, repeated: int) -> Iterator[tuple[bytes, str]]:
         clock = self._node.get_clock()
         if clock.ros_time_is_active and clock.now().nanoseconds == 0:
             yield DiagnosticStatus.WARN, "use_sim_time is true, and no message arrives on /clock"
@@ -141,20 +147,30 @@ class AxesDiagnostics:
             yield DiagnosticStatus.WARN, f"{lost} samples were lost; the voltages were held constant over the gap"
         if repeated:
             yield DiagnosticStatus.WARN, f"{repeated} samples came more than once or too late and were dropped"
-        if rejoined:
-            yield DiagnosticStatus.WARN, f"the stamps of a stream moved {rejoined} times; it was joined anew"
-        predictor = self._predictor
-        if predictor is None:
+        predictor, joiner = self._predictor, self._joiner
+        if predictor is None or joiner is None:
             yield DiagnosticStatus.WARN, "there is no model; set model_file"
             return
+        for stream, move in joiner.moves:
+            yield (
+                DiagnosticStatus.WARN,
+                f"the stamps of {self._streams[stream]} moved by {move:.3g} s; all axes were joined anew",
+            )
+        joiner.moves.clear()
         if silent:
+            return
+        if not joined:
+            yield (
+                DiagnosticStatus.STALE,
+                f"no samples of the same time, the newest are {joiner.apart:.3g} s apart; set the clocks to one time",
+            )
             return
         if predictor.warming_up:
             yield DiagnosticStatus.WARN, "the model is warming up, because the earlier drive voltages are unknown"
-        if predictor.level > (1.0 + LEVEL_TOLERANCE) * predictor.model.level_max:
+        if self._level > (1.0 + LEVEL_TOLERANCE) * predictor.model.level_max:
             yield (
                 DiagnosticStatus.WARN,
-                f"the drives reach {predictor.level:.3g} V rms, the model was identified up to "
+                f"the drives reach {self._level:.3g} V rms, the model was identified up to "
                 f"{predictor.model.level_max:.3g} V",
             )
         for number, (rms, error) in enumerate(

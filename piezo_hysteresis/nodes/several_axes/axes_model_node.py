@@ -22,11 +22,13 @@ from functools import partial
 
 import numpy as np
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.parameter import Parameter as RosParameter
 from std_srvs.srv import Trigger
 
 from ...blocks.kernel import on_compilation
-from ...errors import PiezoError, RecordError
+from ...errors import PiezoError, RecordError, printable
 from ...model import axes_file
 from ...model.axes_model import AxesModel
 from ...model.model_parameters import first_bits
@@ -64,11 +66,9 @@ class AxesModelNode(GuardedNode):
         super().__init__("axes_model_node")
         declare(self, AXES)
         self._values = read(self, AXES)
-        names = [part.strip() for part in self._values["axes"].split(",") if part.strip()]
-        if len(set(names)) != len(names):
-            raise RecordError(f"axes: got '{self._values['axes']}', expected every namespace once")
         self._streams = [
-            AxisStream(self, name, partial(self._on_samples, number)) for number, name in enumerate(names or [""])
+            AxisStream(self, name, partial(self._on_samples, number))
+            for number, name in enumerate(self._namespaces(self._values["axes"]))
         ]
         self._diagnostics = AxesDiagnostics(self, [stream.name for stream in self._streams], self._values)
         self._joiner: AxesJoiner | None = None
@@ -78,7 +78,20 @@ class AxesModelNode(GuardedNode):
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._apply)
         self.create_service(Trigger, "~/zero", self._on_zero)
-        self.get_logger().info(LISTENING)
+        self.get_logger().info(f"{LISTENING} of {', '.join(stream.name for stream in self._streams)}")
+
+    def _namespaces(self, given: str) -> list[str]:
+        """Namespaces in the parameter `axes`; RecordError if one is invalid, or given twice."""
+        names = [part.strip() for part in given.split(",") if part.strip()]
+        try:
+            topics = {self.resolve_topic_name(f"{name.rstrip('/')}/samples") for name in names}
+        except (ValueError, InvalidTopicNameException, rclpy_implementation.RCLError):
+            topics = set()
+        if len(topics) != len(names):
+            raise RecordError(
+                f"axes: got '{printable(given)}', expected namespaces such as /stage_x,/stage_y, each of them once"
+            )
+        return names or [""]
 
     def _on_samples(self, number: int, message: bytes) -> None:
         stream = self._streams[number]
@@ -87,11 +100,22 @@ class AxesModelNode(GuardedNode):
             self._diagnostics.saw(number, block, now(self))
             if self._joiner is None or self._predictor is None:
                 return
+            self._require_axes(self._predictor.model)
             self._joiner.add(number, block)
             for joined in self._joiner.take():
                 self._predict(joined, self._joiner, self._predictor)
         except PiezoError as error:
             self._diagnostics.problem(f"{stream.name}: {error}")
+
+    def _require_axes(self, model: AxesModel) -> None:
+        """Refuse blocks with other axes than those of the model, as soon as a block of every stream is known."""
+        known = [stream.axes for stream in self._streams if stream.axes is not None]
+        drives, displacements = (sum(axes[quantity] for axes in known) for quantity in range(2))
+        if len(known) == len(self._streams) and (drives, displacements) != (model.inputs, model.outputs):
+            raise RecordError(
+                f"got {drives} drives and {displacements} displacements of all axes, expected {model.inputs} and "
+                f"{model.outputs} as the model has"
+            )
 
     def _predict(self, joined: JoinedBlock, joiner: AxesJoiner, predictor: AxesPredictor) -> None:
         answer = predictor.predict(
@@ -113,17 +137,18 @@ class AxesModelNode(GuardedNode):
                 joiner.joined,
                 joiner.sample_period,
             )
+        self._diagnostics.reached(predictor.level)
 
     def _load(self, path: str) -> None:
         try:
             model = axes_file.load(path)
+            joiner = AxesJoiner(len(self._streams), model.sample_period)
         except PiezoError as error:
             self._diagnostics.refused(f"model_file: {error}")
             return
         self._compile(model)
         self._number = first_bits(axes_file.content_hash(model))
-        self._predictor = AxesPredictor(model, self._values["rms_time"])
-        self._joiner = AxesJoiner(len(self._streams), model.sample_period)
+        self._joiner, self._predictor = joiner, AxesPredictor(model, self._values["rms_time"])
         self._diagnostics.follow(self._joiner, self._predictor)
 
     def _compile(self, model: AxesModel) -> None:

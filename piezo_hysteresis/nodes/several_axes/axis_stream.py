@@ -42,17 +42,27 @@ class AxisStream:
         Namespace of a driver; empty for that of the node.
     received : callable
         Called with every serialised message of `samples`.
+
+    Attributes
+    ----------
+    name : str
+        The namespace.
+    axes : tuple of int, or None
+        Numbers of voltages and of displacements in the newest block; None before the first one.
     """
 
     def __init__(self, node: Node, namespace: str, received: Callable[[bytes], None]) -> None:
         self.name = namespace or node.get_namespace()
+        self.axes: tuple[int, int] | None = None
         self._reader = SampleReader(axis_of)
         self._topics = ModelTopics(node, namespace)
         subscribe(node, "samples", received, namespace, deep=True, raw=True)
 
     def read(self, message: bytes) -> SampleBlock:
         """Block of a message with its further axes; RecordError where it cannot be read."""
-        return self._reader.read(message)
+        block = self._reader.read(message)
+        self.axes = len(axes_of(block.channels, "voltage")), len(axes_of(block.channels, "displacement"))
+        return block
 
     def publish(
         self,

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`joined`: makes one segment with the channels of all axes from the streams of several drivers."""
+"""`JoinedAxes`: makes one segment with the channels of all axes from the messages of several drivers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from functools import reduce
 
 import numpy as np
@@ -24,74 +24,157 @@ from numpy.typing import NDArray
 
 from ...channel_mapping import axes_of
 from ...errors import RecordingError
-from ...record import Notice, Samples
+from ...record import Samples
 from ..segmentation.segment import Segment
-from .sample_stream import PERIOD_TOLERANCE, SampleStream
+from ..table.column import Column
+from ..table.time_column import round_period
+from .block_message import BlockMessage
+
+PERIOD_TOLERANCE = 1e-3
+"""Largest relative difference of two sample periods."""
+
+LARGEST_SKEW = 2e-3
+"""Change of the stamps of a driver against its index above which samples cannot be joined [s]; at least a sample."""
 
 
-def joined(streams: Mapping[str, SampleStream]) -> tuple[Segment, list[Notice]]:
-    """Samples of the same time from every stream, with the axes in the order of the streams.
-
-    The stamps of the first samples relate the streams, the running index counts from there.
+class JoinedAxes:
+    """Collects the blocks of several drivers that run together.
 
     Parameters
     ----------
-    streams : mapping of str to SampleStream
-        By namespace.
-
-    Returns
-    -------
-    segment : Segment
-        From the first to the last time that all streams have; samples that one of them lost are missing.
-    notices : list of Notice
-        Findings about the streams.
-
-    Raises
-    ------
-    RecordingError
-        If the streams have different sample periods, or no sample of the same time.
+    axes : sequence of str
+        Namespaces in the order of the axes.
+    sample_period : float, optional
+        Sample period [s] that replaces the times in the blocks.
     """
-    notices: list[Notice] = []
-    parts: dict[str, list[Segment]] = {}
-    for name, stream in streams.items():
-        parts[name], found = stream.segments(split_phases=False)
-        notices += [Notice(notice.kind, f"{name}: {notice.message}", severe=notice.severe) for notice in found]
-    first, *_ = parts
-    period = parts[first][0].sample_period
-    for name, segments in parts.items():
-        for segment in segments:
-            if abs(segment.sample_period / period - 1) > PERIOD_TOLERANCE:
+
+    def __init__(self, axes: Sequence[str], sample_period: float | None = None) -> None:
+        self._axes = {axis: _Axis(axis, sample_period) for axis in axes}
+
+    def add(self, axis: str, block: BlockMessage) -> None:
+        """Append a block of one driver."""
+        self._axes[axis].add(block)
+
+    @property
+    def absent(self) -> list[str]:
+        """Namespaces of which no sample was read."""
+        return [name for name, axis in self._axes.items() if not axis.places]
+
+    def segment(self, received_ns: int) -> Segment:
+        """Samples of the same time from every driver; those that one of them lost are missing.
+
+        Parameters
+        ----------
+        received_ns : int
+            Time at which the first block was received [ns].
+
+        Raises
+        ------
+        RecordingError
+            If the drivers have different sample periods, stamps that contradict the index, or no sample of the same
+            time.
+        """
+        axes = list(self._axes.values())
+        period, begin = axes[0].period, axes[0].begin(axes[0].period)
+        for axis in axes[1:]:
+            if abs(axis.period / period - 1) > PERIOD_TOLERANCE:
                 raise RecordingError(
-                    f"{name}: got the sample period {segment.sample_period:g} s, expected {period:g} s as of {first}"
+                    f"{axis.name}: got the sample period {axis.period:g} s, expected {period:g} s as of {axes[0].name}"
                 )
-    places = [_places(parts[name], period, (streams[name].begin_ns - streams[first].begin_ns) * 1e-9) for name in parts]
-    common = reduce(np.intersect1d, places)
-    if common.size == 0:
-        raise RecordingError(f"{', '.join(parts)}: got no samples of the same time, expected drivers that run together")
-    channels: dict[str, Samples] = {}
-    was_driven = False
-    for place, segments in zip(places, parts.values(), strict=True):
-        _, kept, _ = np.intersect1d(place, common, return_indices=True)
-        names = segments[0].channels.keys() - {"voltage", "displacement"}
-        for quantity in ("voltage", "displacement"):
-            for name in axes_of(names, quantity):
-                values = np.concatenate([segment.channels[name] for segment in segments])
-                number = sum(channel.startswith(quantity) for channel in channels) + 1
-                channels[f"{quantity}_{number}" if number > 1 else quantity] = values[kept]
-                was_driven |= quantity == "voltage" and bool(np.ptp(values[: kept[0] + 1]) > 0)
-        was_driven |= segments[0].phase != 0
-    steps = np.diff(common)
-    breaks = {int(at) + 1: int(steps[at]) - 1 for at in np.flatnonzero(steps > 1)}
-    received = parts[first][0].received_ns
-    return Segment(channels, period, int(was_driven), 0.0, received, 0, breaks, {}, True), notices
+        kept = [axis.numbers + round((axis.begin(period) - begin) * 1e-9 / period) for axis in axes]
+        common = reduce(np.intersect1d, kept)
+        if common.size == 0:
+            raise RecordingError(
+                f"{', '.join(self._axes)}: got no samples of the same time, expected drivers that run together"
+            )
+        channels: dict[str, Samples] = {}
+        was_driven, pauses = False, set(common.tolist())
+        for axis, numbers in zip(axes, kept, strict=True):
+            _, first, _ = np.intersect1d(numbers, common, return_indices=True)
+            values = axis.channels
+            for quantity in ("voltage", "displacement"):
+                for name in axes_of(values, quantity):
+                    number = sum(channel.startswith(quantity) for channel in channels) + 1
+                    channels[f"{quantity}_{number}" if number > 1 else quantity] = values[name][first]
+            was_driven |= axis.was_driven(int(first[0]))
+            pauses &= {int(numbers[at]) for at in axis.paused}
+        steps = np.diff(common)
+        holes = {int(at) + 1: int(steps[at]) - 1 for at in np.flatnonzero(steps > 1)}
+        paused = {at: count for at, count in holes.items() if int(common[at]) in pauses}
+        breaks = {at: count for at, count in holes.items() if at not in paused}
+        return Segment(channels, period, int(was_driven), 0.0, received_ns, 0, breaks, paused, True)
 
 
-def _places(segments: list[Segment], period: float, offset: float) -> NDArray[np.int64]:
-    """Number of every sample on the time base of the first stream; `offset` is the time of the first sample [s]."""
-    places = []
-    for segment in segments:
-        missing = np.zeros(segment.size, np.int64)
-        for at, count in (*segment.breaks.items(), *segment.pauses.items()):
-            missing[at:] += count if at else 0
-        places.append(round((offset + segment.start_time) / period) + np.arange(segment.size) + missing)
-    return np.concatenate(places)
+class _Axis:
+    """The blocks of one driver in order of arrival."""
+
+    def __init__(self, name: str, sample_period: float | None) -> None:
+        self.name, self._given = name, sample_period
+        self._channels: dict[str, Column] = {}
+        self._index, self._phase = Column(np.uint32), Column(np.uint32)
+        self.places: list[int] = []
+        self.paused: list[int] = []
+        self._times_ns: list[int] = []
+        self._periods: list[float] = []
+
+    def add(self, block: BlockMessage) -> None:
+        begin, n = len(self._index), block.phase.size
+        if not self._channels:
+            self._channels = {name: Column(np.float64) for name in block.channels}
+        if block.channels.keys() != self._channels.keys() or block.index is None or block.time is None:
+            raise RecordingError(
+                f"{self.name}: got a block with {', '.join(block.channels)}, expected time, index and "
+                f"{', '.join(self._channels)} in every block"
+            )
+        for name, column in self._channels.items():
+            column.extend(block.channels[name])
+        self._index.extend(block.index)
+        self._phase.extend(block.phase)
+        self.places.append(begin)
+        if block.follows_pause:
+            self.paused.append(begin)
+        self._times_ns.append(block.stamp_ns + round(float(block.time[0]) * 1e9))
+        if n > 1:
+            self._periods.append(float(block.time[-1] - block.time[0]) / (n - 1))
+
+    @property
+    def period(self) -> float:
+        """Sample period [s]."""
+        if self._given is None and not self._periods:
+            raise RecordingError(f"{self.name}: got only blocks of one sample, expected a period; give `sample_period`")
+        return round_period(float(np.median(self._periods))) if self._given is None else self._given
+
+    @property
+    def numbers(self) -> NDArray[np.int64]:
+        """Running number of every sample; the index wraps at 2³²."""
+        index = self._index.array().astype(np.int64)
+        steps = (np.diff(index) + 2**31) % 2**32 - 2**31
+        return np.concatenate(([0], steps.cumsum()))
+
+    @property
+    def channels(self) -> dict[str, Samples]:
+        """Samples of every channel in order of arrival."""
+        return {name: column.array() for name, column in self._channels.items()}
+
+    def begin(self, period: float) -> float:
+        """Time of number 0 by the stamps of all blocks [ns].
+
+        Raises
+        ------
+        RecordingError
+            If the stamps contradict the index: a restart, or a clock that was set.
+        """
+        begins = np.array(self._times_ns, np.int64) - np.int64(self._times_ns[0])
+        begins = begins - self.numbers[self.places] * period * 1e9
+        spread = float(np.ptp(begins)) * 1e-9
+        if spread > max(LARGEST_SKEW, period):
+            raise RecordingError(
+                f"{self.name}: the stamps move by {spread:.3g} s against the index, expected a driver that ran without "
+                "a restart and a clock that was not set; record the axes again, in shorter bags if the clocks drift"
+            )
+        return self._times_ns[0] + float(np.median(begins))
+
+    def was_driven(self, first: int) -> bool:
+        """Whether the stage had been driven, or was moving, before the sample that arrived as number `first`."""
+        before = self._channels["voltage"].array()[: first + 1]
+        return bool(self._phase.array()[0] != 0 or np.ptp(before) > 0)

@@ -31,7 +31,7 @@ from .bag import STORAGES, Bag
 from .bag_writer import BagWriter
 from .block_message import TYPE, BlockMessage, typestore
 from .foreign_topics import read_topics
-from .joined_axes import joined
+from .joined_axes import JoinedAxes
 from .phase_topic import STRING, PhaseNames
 from .recorded_phases import records_of
 from .sample_stream import SampleStream
@@ -135,8 +135,19 @@ def _space(topic: str, name: str) -> str | None:
     return _absolute(space) if last == name else None
 
 
+def _axes(options: ReadOptions) -> list[str]:
+    """Absolute namespaces in the option `axis`; RecordingError where one is given twice."""
+    parts = [] if options.axis is None else [part for part in options.axis.replace(" ", "").split(",") if part]
+    axes = [_absolute(part) for part in parts]
+    if len(set(axes)) != len(axes):
+        raise RecordingError(f"`axis`: got '{options.axis}', expected every namespace once")
+    return axes
+
+
 def _read_samples(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[Notice]]:
-    axes = [] if options.axis is None else [_absolute(part.strip()) for part in options.axis.split(",")]
+    axes = _axes(options)
+    if len(axes) > 1:
+        return _read_joined(bag, axes, options)
     streams: dict[str, SampleStream] = {}
     names: dict[str, PhaseNames] = {}
     damaged = 0
@@ -152,29 +163,51 @@ def _read_samples(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[No
                 names.setdefault(space, PhaseNames()).add(message.raw, message.time_ns)
         except Exception:  # the decoder raises any error on damaged bytes
             damaged += 1
-        if len(streams) > max(1, len(axes)):
+        if len(streams) > 1:
             raise RecordingError(
                 f"holds several stages, expected one; give `axis`: one of {', '.join(sorted(streams))}, or all of them "
                 "with commas between for a stage of several axes"
             )
-    notices = [Notice("damaged", f"{damaged} messages could not be decoded and were skipped")] if damaged else []
-    absent = [axis for axis in axes if axis not in streams]
-    if absent or not streams:
-        where = f" of {', '.join(absent)}" if absent else ""
-        raise RecordingError(
-            f"got no readable samples{where} (topic 'samples', {TYPE}); map foreign topics by `columns`, e.g. "
-            "voltage=/ao.data displacement=/sensor.data"
-        )
-    if len(axes) > 1:
-        segment, found = joined({axis: streams[axis] for axis in axes})
-        whole = replace(options, phases="record" if options.phases is None else options.phases)
-        records, more = records_of([segment], shared_averages([segment.size], options.average), PhaseNames(), whole)
-        return records, [*notices, *found, *more]
+    if not streams:
+        raise _no_samples(axes)
     (space, stream), *_ = streams.items()
-    segments, more_notices = stream.segments(split_phases=options.phases is None)
+    segments, notices = stream.segments(split_phases=options.phases is None)
     averages = shared_averages([s.size for s in segments], options.average)
     records, more = records_of(segments, averages, names.get(space, PhaseNames()), options)
-    return records, [*notices, *more_notices, *more]
+    return records, [*_damage(damaged), *notices, *more]
+
+
+def _read_joined(bag: Bag, axes: list[str], options: ReadOptions) -> tuple[list[Record], list[Notice]]:
+    """One recording of the drivers of several axes, without phases: they begin at other times on every axis."""
+    joined = JoinedAxes(axes, options.sample_period)
+    received: list[int] = []
+    damaged = 0
+    for message in bag.messages([f"{axis.rstrip('/')}/samples" for axis in axes]):
+        try:
+            block = BlockMessage.from_cdr(message.raw)
+        except Exception:  # the decoder raises any error on damaged bytes
+            damaged += 1
+            continue
+        joined.add(_space(message.topic, "samples") or "", block)
+        received = received or [message.time_ns]
+    if joined.absent:
+        raise _no_samples(joined.absent)
+    segment = joined.segment(received[0])
+    whole = replace(options, phases="record" if options.phases is None else options.phases)
+    records, notices = records_of([segment], shared_averages([segment.size], options.average), PhaseNames(), whole)
+    return records, [*_damage(damaged), *notices]
+
+
+def _damage(count: int) -> list[Notice]:
+    return [Notice("damaged", f"{count} messages could not be decoded and were skipped")] if count else []
+
+
+def _no_samples(axes: list[str]) -> RecordingError:
+    where = f" of {', '.join(axes)}" if axes else ""
+    return RecordingError(
+        f"got no readable samples{where} (topic 'samples', {TYPE}); map foreign topics by `columns`, e.g. "
+        "voltage=/ao.data displacement=/sensor.data"
+    )
 
 
 def _write_records(bag: BagWriter, experiment: Experiment) -> None:

@@ -78,13 +78,13 @@ class SampleStream:
         self._uneven = 0
 
     @property
-    def begin_ns(self) -> int:
-        """Time of the first sample that was received [ns]."""
-        return self._times_ns[0]
+    def size(self) -> int:
+        """Number of samples received."""
+        return len(self._index)
 
     def add(self, block: BlockMessage, received_ns: int) -> None:
         """Append a block in the order of arrival; channels that other blocks have are filled with NaN."""
-        begin, n = len(self._index), block.phase.size
+        begin, n = self.size, block.phase.size
         follows = (self._next + np.arange(n, dtype=np.int64)).astype(np.uint32)
         index = follows if block.index is None else block.index
         self._next = int(index[-1]) + 1

@@ -22,20 +22,21 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState, PointCloud2
 from std_srvs.srv import Trigger
 
+from piezo_hysteresis.acquisition.sample_block import SampleBlock
 from piezo_hysteresis.identification.identify_axes import axes_errors, identify_axes
 from piezo_hysteresis.model import axes_file
 from piezo_hysteresis.model.axes_samples import columns
 from piezo_hysteresis.model.model_parameters import first_bits
 from piezo_hysteresis.nodes.messages.cloud import from_cloud
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
-from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES, samples_from_cloud
+from piezo_hysteresis.nodes.messages.samples import PREDICTED_SAMPLES, samples_from_cloud, samples_to_cloud
 from piezo_hysteresis.nodes.runtime.qos import DEEP
 from piezo_hysteresis.online.axes_joiner import AxesJoiner
 from piezo_hysteresis.online.axes_predictor import AxesPredictor
 from piezo_hysteresis.record import Record
 from piezo_hysteresis.recording import write
 
-from ...coupled_plant import plant
+from ...coupled_plant import GAINS, plant
 
 pytestmark = pytest.mark.nodes
 
@@ -179,12 +180,53 @@ def test_a_wrong_file_a_missing_axis_and_other_numbers_are_told_and_the_node_run
     status = lab.wait(of_one, "the driver that is still silent")[0]
     assert status.level == DiagnosticStatus.STALE
     lab.driver(namespace="/stage_y", sample_period=1e-3)
-    lab.wait(lambda: reported(reports, "got 2 drives and 2 displacements, expected 3 and 3"), "the missing axis")
+    lab.wait(
+        lambda: reported(reports, "got 2 drives and 2 displacements of all axes, expected 3 and 3"), "the missing axis"
+    )
     assert lab.call(Trigger, "axes_model_node/zero").success
     assert lab.processes[0].is_running
 
 
-def test_a_namespace_named_twice_ends_the_start_with_one_line(lab):
-    node = lab.start("axes_model_node", axes="/stage_x, /stage_x", fresh=True)
+@pytest.mark.parametrize("axes", ["/stage_x, /stage_x", "stage_x,/stage_x/", "/a b", "x//y", "{stage}"])
+def test_invalid_namespaces_end_the_start_with_one_line(lab, axes):
+    node = lab.start("axes_model_node", axes=axes)
     assert node.wait() == 2
-    assert node.output.strip().splitlines()[-1].endswith("expected every namespace once")
+    assert f"axes: got '{axes}', expected namespaces such as /stage_x,/stage_y" in node.output.strip().splitlines()[-1]
+
+
+def test_clocks_that_differ_and_a_block_without_an_axis_are_told(lab, model, tmp_path):
+    reports = lab.listen(DiagnosticArray, "/diagnostics", 10)
+    predicted = lab.listen(PointCloud2, "/stage_x/predicted_samples", DEEP)
+    two = identify_axes([plant(seed, gains=GAINS[:2, :2]) for seed in (1, 2)], length=5)
+    lab.start("axes_model_node", axes="/stage_x,/stage_y", model_file=str(axes_file.save(two, tmp_path / "model.npz")))
+    publishers = [lab.publisher(PointCloud2, f"/stage_{axis}/samples", DEEP) for axis in "xy"]
+    lab.wait(lambda: lab.node.count_publishers("/stage_x/predicted_samples"), "the model node")
+
+    def send(first, late, further=()):
+        """A tenth of a second of both axes, the second of which may be late [s]."""
+        for number, publisher in enumerate(publishers):
+            at = first + np.arange(100)
+            stamp = 10**18 + round((first * 1e-3 + late * number) * 1e9)
+            channels = {name: np.zeros(100) for name in further}
+            u, phase = 0.2 * np.sin(0.1 * at), np.zeros(100, np.uint32)
+            index = at.astype(np.uint32)
+            block = SampleBlock(stamp, 1e-3 * np.arange(100), u, 1e-6 * u, index, phase, channels=channels)
+            publisher.publish(samples_to_cloud(block))
+
+    def keep_sending(first, late, what, **named):
+        """Blocks at the pace of the clock until the node says something."""
+        for _ in range(200):
+            send(first, late, **named)
+            first += 100
+            lab.pause(0.1)
+            if reported(reports, what):
+                return first
+        pytest.fail(f"waited 20 s for '{what}'\n{lab.processes[0].output}")
+
+    first = keep_sending(0, 0.0, "predicting")
+    assert predicted[-1].is_dense
+    begun = len(predicted)
+    first = keep_sending(first, 5.0, "no samples of the same time, the newest are 5 s apart")
+    assert reported(reports, "the stamps of /stage_y moved by 5 s; all axes were joined anew")
+    first = keep_sending(first, 5.0, "got 4 drives and 2 displacements", further=["voltage_2"])
+    assert not any(cloud.is_dense for cloud in predicted[begun + 2 :])

@@ -21,6 +21,7 @@ from piezo_hysteresis.errors import RecordingError
 from piezo_hysteresis.identification.identify_axes import axes_errors, identify_axes
 from piezo_hysteresis.model.axes_samples import columns
 from piezo_hysteresis.recording import BagWriter, read, write
+from piezo_hysteresis.recording.bag.block_message import TYPE, BlockMessage
 
 from ...coupled_plant import plant
 from .test_rosbag2 import PERIOD, SIZE, Driver, kinds
@@ -81,6 +82,76 @@ def test_what_one_driver_lost_splits_the_recording(tmp_path):
 def test_a_drive_that_moved_before_all_ran_leaves_the_state_unknown(tmp_path):
     bag, _ = recorded(tmp_path / "bag", moving=True)
     assert read(bag, axis=",".join(AXES))[0].truncated
+
+
+def played(path, messages, periods=(PERIOD, PERIOD)):
+    """A bag of two drivers; a message is driver, number of the block, shift of its stamp [s] and follows_pause."""
+    with BagWriter(path) as bag:
+        for axis in AXES[:2]:
+            bag.add_topic(f"{axis}/samples", TYPE)
+        for driver, number, shift, pause in messages:
+            count = np.arange(SIZE)
+            at = number * SIZE + count
+            block = BlockMessage(
+                10**18 + round((number * SIZE * periods[driver] + shift) * 1e9),
+                {"voltage": np.sin(0.01 * at), "displacement": 1e-6 * at},
+                np.zeros(SIZE, np.uint32),
+                count * periods[driver],
+                at.astype(np.uint32),
+                pause,
+            )
+            bag.write(f"{AXES[driver]}/samples", block.stamp_ns, block.to_cdr())
+    return read(path, axis=",".join(AXES[:2]))
+
+
+def of_both(*numbers, shift=lambda number: 0.0):
+    """Messages of both drivers; the stamps of the second are shifted."""
+    return [(driver, n, shift(n) if driver else 0.0, False) for n in numbers for driver in range(2)]
+
+
+def skew(record):
+    """Largest difference of the times of two samples that stand beside one another [samples]."""
+    return np.abs(record.displacement - record.channels["displacement_2"]).max() / 1e-6
+
+
+@pytest.mark.parametrize(
+    "messages",
+    [
+        of_both(*range(40)),
+        of_both(1, 0, *range(2, 40)),
+        of_both(*range(40), shift=lambda n: 1e-3 if n == 0 else 0.0),
+    ],
+    ids=["in order", "out of order", "a late first stamp"],
+)
+def test_single_stamps_and_the_order_of_arrival_do_not_matter(tmp_path, messages):
+    (record,) = played(tmp_path / "bag", messages)
+    assert skew(record) < 1e-6
+    assert record.size == 40 * SIZE
+
+
+@pytest.mark.parametrize("shift", [lambda n: 0.05 * (n >= 20), lambda n: 2e-4 * n], ids=["clock set", "clock drifts"])
+def test_stamps_that_contradict_the_index_are_refused(tmp_path, shift):
+    with pytest.raises(RecordingError, match=r"/stage_y: the stamps move by 0\.0\d+ s against the index"):
+        played(tmp_path / "bag", of_both(*range(40), shift=shift))
+
+
+def test_another_sample_period_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match=r"/stage_y: got the sample period 2\.01e-05 s, expected 2e-05 s"):
+        played(tmp_path / "bag", of_both(*range(4)), periods=(PERIOD, 1.005 * PERIOD))
+
+
+@pytest.mark.parametrize("both", [True, False])
+def test_a_pause_of_all_devices_is_not_a_loss(tmp_path, both):
+    messages = [(d, n, 0.0, n == 3 and (both or d == 0)) for n in (0, 1, 3, 4) for d in range(2)]
+    experiment = played(tmp_path / "bag", messages)
+    assert [record.truncated for record in experiment] == [False, not both]
+    assert ("pause" in kinds(experiment)) == both
+
+
+def test_a_namespace_given_twice_is_refused(tmp_path):
+    bag, _ = recorded(tmp_path / "bag")
+    with pytest.raises(RecordingError, match="expected every namespace once"):
+        read(bag, axis="/stage_x, stage_x")
 
 
 def test_an_axis_that_is_not_in_the_bag_and_drivers_that_never_ran_together_are_told(tmp_path):
