@@ -19,13 +19,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from rcl_interfaces.msg import SetParametersResult
-from rclpy.parameter import Parameter as RosParameter
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from ...acquisition.sample_block import SampleBlock
-from ...errors import PiezoError, RecordError
+from ...errors import PiezoError
 from ...model.model import Model
 from ...model.model_file import load, loads
 from ...model.model_parameters import hash_number, model_hash
@@ -38,7 +36,7 @@ from ..messages.samples import SampleReader
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.launch_values import LISTENING
 from ..runtime.node_clock import now
-from ..runtime.parameters import declare, read
+from ..runtime.parameters import declare, let_change, read
 from ..runtime.process import run
 from ..topics import subscribe
 from .change_reporter import CHANGE, ChangeReporter
@@ -76,8 +74,7 @@ class ModelNode(GuardedNode):
         self._recalibrator = Recalibrator(self, self._changes, self._follow)
         if self._values["model_file"]:
             self._load(self._values["model_file"])
-        self.add_on_set_parameters_callback(self._check)
-        self.add_post_set_parameters_callback(self._apply)
+        let_change(self, MODEL, "model_file", load, self._load)
         subscribe(self, "model", self._on_model)
         subscribe(self, "samples", self._on_samples, deep=True, raw=True)
         self.create_service(Trigger, "~/zero", self._on_zero)
@@ -166,24 +163,6 @@ class ModelNode(GuardedNode):
             self._changes.restart()
             response.message = "the offset is the mean residual of the next 0.1 s of samples"
         return response
-
-    def _check(self, parameters: list[RosParameter]) -> SetParametersResult:
-        """Read a model file before its name is accepted. The other parameters cannot be changed after the start."""
-        rows = {row.name: row for row in MODEL}
-        try:
-            for parameter in parameters:
-                if parameter.name == "model_file":
-                    load(str(rows[parameter.name].check(parameter.value)))
-                elif parameter.name in rows:
-                    raise RecordError(f"{parameter.name} is read at start; give it then")
-        except PiezoError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
-
-    def _apply(self, parameters: list[RosParameter]) -> None:
-        for parameter in parameters:
-            if parameter.name == "model_file":
-                self._load(parameter.value)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -17,12 +17,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
 
+from ...errors import ParameterError, PiezoError
 from ...parameter import Row, Setting
 
 
@@ -70,3 +72,42 @@ def read(node: Node, rows: Iterable[Row], prefix: str = "") -> dict[str, Any]:
         On a value outside its bounds or choices.
     """
     return {row.name: row.check(node.get_parameter(prefix + row.name).value, prefix) for row in rows}
+
+
+def let_change(
+    node: Node, rows: Iterable[Row], name: str, load: Callable[[str], object], changed: Callable[[str], None]
+) -> None:
+    """Let the path `name` be changed while the node runs. The other rows cannot be changed after the start.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    rows : iterable of Parameter or Setting
+        The declared table.
+    name : str
+        Row of the path.
+    load : callable
+        Reads the file before its path is accepted; it raises PiezoError to refuse it.
+    changed : callable
+        Called with every accepted path.
+    """
+    by_name = {row.name: row for row in rows}
+
+    def check(parameters: list[RosParameter]) -> SetParametersResult:
+        try:
+            for parameter in parameters:
+                if parameter.name == name:
+                    load(str(by_name[name].check(parameter.value)))
+                elif parameter.name in by_name:
+                    raise ParameterError(f"{parameter.name} is read at start; give it then")
+        except PiezoError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def apply(parameters: list[RosParameter]) -> None:
+        for parameter in parameters:
+            if parameter.name == name:
+                changed(parameter.value)
+
+    node.add_on_set_parameters_callback(check)
+    node.add_post_set_parameters_callback(apply)

@@ -103,7 +103,7 @@ class AxesDiagnostics:
             joiner, predictor, now = self._joiner, self._predictor, time.monotonic()
             counts = joiner.joined, joiner.lost, joiner.repeated
             then, before = self._seen
-            new = tuple(now - then for now, then in zip(counts, before, strict=True))
+            new = tuple(count - earlier for count, earlier in zip(counts, before, strict=True))
             self._seen = (now, counts)
             self._joinings += len(joiner.moves)
             values |= {

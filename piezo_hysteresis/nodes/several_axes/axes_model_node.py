@@ -21,10 +21,8 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.parameter import Parameter as RosParameter
 from std_srvs.srv import Trigger
 
 from ...blocks.kernel import on_compilation
@@ -40,7 +38,7 @@ from ..model.residual_alarm import ALARM
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.launch_values import LISTENING
 from ..runtime.node_clock import now
-from ..runtime.parameters import declare, read
+from ..runtime.parameters import declare, let_change, read
 from ..runtime.process import run
 from .axes_diagnostics import AxesDiagnostics
 from .axis_stream import AxisStream, columns, slices
@@ -75,8 +73,7 @@ class AxesModelNode(GuardedNode):
         self._predictor: AxesPredictor | None = None
         if self._values["model_file"]:
             self._load(self._values["model_file"])
-        self.add_on_set_parameters_callback(self._check)
-        self.add_post_set_parameters_callback(self._apply)
+        let_change(self, AXES, "model_file", axes_file.load, self._load)
         self.create_service(Trigger, "~/zero", self._on_zero)
         self.get_logger().info(f"{LISTENING} of {', '.join(stream.name for stream in self._streams)}")
 
@@ -163,24 +160,6 @@ class AxesModelNode(GuardedNode):
             self._predictor.zero()
             response.message = "the offsets are the mean residuals of the next 0.1 s of samples"
         return response
-
-    def _check(self, parameters: list[RosParameter]) -> SetParametersResult:
-        """Read a model file before its name is accepted. The other parameters cannot be changed after the start."""
-        rows = {row.name: row for row in AXES}
-        try:
-            for parameter in parameters:
-                if parameter.name == "model_file":
-                    axes_file.load(str(rows[parameter.name].check(parameter.value)))
-                elif parameter.name in rows:
-                    raise RecordError(f"{parameter.name} is read at start; give it then")
-        except PiezoError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
-
-    def _apply(self, parameters: list[RosParameter]) -> None:
-        for parameter in parameters:
-            if parameter.name == "model_file":
-                self._load(parameter.value)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
