@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 import hashlib
+import lzma
+import tokenize
 import zipfile
 import zlib
 from dataclasses import fields
@@ -33,7 +35,10 @@ _NAMES = tuple(f.name for f in fields(AxesModel) if f.init)
 _NUMBERS = ("sample_period", "reference", "memory", "level_max")
 """Keys with one number."""
 
-_DAMAGED = (ValueError, TypeError, EOFError, MemoryError, NotImplementedError, RuntimeError, zlib.error)
+_DAMAGED = (
+    ValueError, TypeError, EOFError, MemoryError, NotImplementedError, RuntimeError, lzma.LZMAError,
+    tokenize.TokenError, zlib.error,
+)  # fmt: skip
 """Exceptions of a reader of NPZ files on damaged ones."""
 
 _OPTIONAL = ("level_max", "free_run_error")
@@ -76,15 +81,15 @@ def load(path: str | Path) -> AxesModel:
             pass
         with np.load(path, allow_pickle=False) as file:
             if missing := [name for name in _NAMES if name not in file and name not in _OPTIONAL]:
-                raise ModelError(f"{path}: got an NPZ file without '{missing[0]}', {expected}")
+                raise ModelError(f"got an NPZ file without '{missing[0]}', {expected}")
             values = {name: file[name] for name in _NAMES if name in file}
         model = AxesModel(**values | {name: float(value) for name, value in values.items() if name in _NUMBERS})
     except OSError as error:
         raise ModelError(f"{path}: {error.strerror or error}, {expected}") from None
     except zipfile.BadZipFile:
         raise ModelError(f"{path}: got no NPZ file, {expected}") from None
-    except ModelError:
-        raise
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from None
     except _DAMAGED as error:
         raise ModelError(f"{path}: damaged ({error}), {expected}") from None
     return model

@@ -34,9 +34,6 @@ LONGEST_WAIT = 2.0
 PERIOD_TOLERANCE = 1e-3
 """Largest relative difference of the sample periods of a stream and of the model, as in the identification."""
 
-SINGLE_TOLERANCE = 0.3
-"""As `PERIOD_TOLERANCE`, for blocks of one sample, whose stamps are less regular."""
-
 
 @dataclass(frozen=True, eq=False, slots=True)
 class JoinedBlock:
@@ -50,16 +47,14 @@ class JoinedBlock:
         Number of samples before it that did not arrive from every stream.
     restarted : bool
         True for the first block, and after the streams were joined anew.
+    follows_gap : bool
+        True where no stream measured the missing samples.
     """
 
     blocks: tuple[SampleBlock, ...]
     missing: int
     restarted: bool
-
-    @property
-    def follows_gap(self) -> bool:
-        """True where no stream measured the missing samples."""
-        return all(block.follows_gap for block in self.blocks)
+    follows_gap: bool
 
     @property
     def is_undriven(self) -> bool:
@@ -76,7 +71,8 @@ class _Stream:
     count: int = 0
     end: int | None = None
     skew: float = 0.0
-    newest: tuple[int, int] | None = None
+    since: tuple[int, int] | None = None
+    period: float | None = None
 
     def add(self, first: int, block: SampleBlock, most: int) -> None:
         """Append a block, and drop old ones beyond a number of samples; the new one stays."""
@@ -136,6 +132,7 @@ class AxesJoiner:
         self._streams = [_Stream(SequenceCheck(sample_period)) for _ in range(streams)]
         self._origin: int | None = None
         self._next: int | None = None
+        self._dropped = False
 
     @property
     def lost(self) -> int:
@@ -178,7 +175,7 @@ class AxesJoiner:
         time = _time(block)
         if arrival.restarted and self._origin is not None and stream.end is not None:
             self._begin()
-        first = self._number_at(time) if stream.end is None else stream.end + arrival.missing
+        first = self._number_at(time, self._drift(number)) if stream.end is None else stream.end + arrival.missing
         skew = self._skew(time, first)
         move = self._move(number, skew)
         if abs(move) > max(LARGEST_SKEW, self.sample_period):
@@ -193,6 +190,7 @@ class AxesJoiner:
         """The samples that every stream has by now, in blocks without a gap; they are returned once."""
         while all(stream.waiting for stream in self._streams):
             first = max(stream.waiting[0][0] for stream in self._streams)
+            self._dropped |= any(stream.waiting[0][0] < first for stream in self._streams)
             for stream in self._streams:
                 stream.drop_before(first)
             fronts = [stream.waiting[0] for stream in self._streams if stream.waiting]
@@ -203,20 +201,26 @@ class AxesJoiner:
             for stream in self._streams:
                 stream.drop_before(first + size)
             restarted, missing = self._next is None, 0 if self._next is None else first - self._next
-            self._next = first + size
+            follows_gap = not self._dropped and all(block.follows_gap for block in parts)
+            self._next, self._dropped = first + size, False
             self.joined += size
-            yield JoinedBlock(parts, missing, restarted)
+            yield JoinedBlock(parts, missing, restarted, follows_gap)
 
     def _begin(self) -> None:
         for stream in self._streams:
             stream.forget()
         self._origin = self._next = None
 
-    def _number_at(self, time: int) -> int:
-        """Number of the sample at a time [ns]; the first time that is asked for gets 0."""
+    def _number_at(self, time: int, drift: float = 0.0) -> int:
+        """Number of the sample at a time [ns], for clocks that have drifted [s]; the first time asked for gets 0."""
         if self._origin is None:
             self._origin = time
-        return round((time - self._origin) * 1e-9 / self.sample_period)
+        return round(((time - self._origin) * 1e-9 - drift) / self.sample_period)
+
+    def _drift(self, number: int) -> float:
+        """How far the stamps of another stream, if one is known, have moved against its index [s]."""
+        others = (s.skew for k, s in enumerate(self._streams) if k != number and s.end is not None)
+        return next(others, 0.0)
 
     def _skew(self, time: int, number: int) -> float:
         """Time of a sample after that of its number [s]."""
@@ -228,15 +232,22 @@ class AxesJoiner:
         return max((skew - other for other in others), key=abs, default=0.0)
 
     def _require_period(self, stream: _Stream, block: SampleBlock) -> None:
-        """Refuse another sample period; that of single samples follows from the time since the block before."""
+        """Refuse another sample period; that of single samples follows from their stamps, about once a second."""
         period, tolerance = block.sample_period, PERIOD_TOLERANCE
-        newest, stream.newest = stream.newest, (int(block.index[0]), _time(block))
-        if period is None and newest is not None:
-            steps, elapsed = (int(block.index[0]) - newest[0]) % 2**32, (_time(block) - newest[1]) * 1e-9
-            if steps < 2**31 and elapsed > 0:
-                period = elapsed / max(steps, 1)
-                tolerance = max(SINGLE_TOLERANCE, LARGEST_SKEW / self.sample_period)
-        if period is not None and abs(period / self.sample_period - 1.0) > tolerance:
+        if period is None:
+            index, time = int(block.index[0]), _time(block)
+            since = stream.since or (index, time)
+            steps, elapsed = (index - since[0]) % 2**32, (time - since[1]) * 1e-9
+            if steps >= 2**31 or elapsed < 0:
+                steps, elapsed, since = 0, 0.0, (index, time)
+            stream.since = since
+            if steps and elapsed >= max(1.0, 2.0 * self.sample_period):
+                stream.since, stream.period = (index, time), elapsed / steps
+                tolerance = LARGEST_SKEW / elapsed
+            period = stream.period
+        else:
+            stream.since, stream.period = None, None
+        if period is not None and abs(period / self.sample_period - 1.0) > max(tolerance, PERIOD_TOLERANCE):
             raise RecordError(f"got the sample period {period:g} s, expected {self.sample_period:g} s as the model has")
 
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import RecordError
+from ..errors import ModelError, RecordError
 from ..model.axes_model import AxesModel
 from .running_rms import RunningRms
 from .sensor_offset import SensorOffset, samples_to_average
@@ -142,6 +142,7 @@ class AxesPredictor:
         """
         u, measured = np.asarray(voltages, dtype=np.float64), np.asarray(displacements, dtype=np.float64)
         if u.ndim != 2 or measured.shape != (len(u), self.model.outputs) or u.shape[1] != self.model.inputs:
+            self._forget()
             raise RecordError(
                 f"samples: got {u.shape[-1]} drives and {measured.shape[-1]} displacements, expected "
                 f"{self.model.inputs} and {self.model.outputs} as the model has"
@@ -153,7 +154,11 @@ class AxesPredictor:
             if not follows_gap:
                 self._forget()
         was_warming_up = self.warming_up
-        modelled, self._state = self.model.run(u, self._state)
+        try:
+            modelled, self._state = self.model.run(u, self._state)
+        except ModelError:
+            self._forget()
+            raise
         self._last = u[-1].copy()
         if was_warming_up:
             self._remember(modelled)

@@ -120,6 +120,13 @@ def test_a_file_with_impossible_numbers_is_refused(model, tmp_path, changed, rea
         axes_file.load(tmp_path / "model.npz")
 
 
+def test_a_file_with_a_damaged_header_is_refused(model, tmp_path):
+    path = axes_file.save(model, tmp_path / "model.npz")
+    path.write_bytes(path.read_bytes().replace(b"(3, 3, 20, 18)", b"(3, 3, 20, 18 "))
+    with pytest.raises(ModelError, match=r"model\.npz: damaged"):
+        axes_file.load(path)
+
+
 def test_a_file_of_an_earlier_version_has_no_level_and_no_error(model, tmp_path):
     held = dict(np.load(axes_file.save(model, tmp_path / "model.npz")))
     del held["level_max"], held["free_run_error"]

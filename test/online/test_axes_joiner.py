@@ -14,6 +14,7 @@
 
 """Streams of several drivers are joined by their times, whatever is lost, late or restarted."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -180,12 +181,49 @@ def test_a_pause_of_one_stream_does_not_vouch_for_the_other():
     assert (np.diff(times(joined), axis=1) == 0).all()
 
 
-def test_single_samples_of_another_period_are_refused():
-    joiner = AxesJoiner(1, 100 * PERIOD)
-    joiner.add(0, block(0, 0, 1))
-    joiner.add(0, replace(block(100, 0, 1), index=np.array([1], np.uint32)))
-    with pytest.raises(RecordError, match=r"got the sample period 0\.02 s, expected 0\.01 s"):
-        joiner.add(0, replace(block(300, 0, 1), index=np.array([2], np.uint32)))
+@pytest.mark.parametrize("period", [0.01, 0.011])
+def test_single_samples_of_another_period_are_refused(period):
+    joiner = AxesJoiner(1, 0.01)
+    jitter = 1e-4 * np.random.default_rng(1).standard_normal(300)
+    singles = [
+        replace(block(0, 0, 1, shift=period * number + late), index=np.array([number], np.uint32))
+        for number, late in enumerate(jitter)
+    ]
+    for one in singles[:50]:  # half a second
+        joiner.add(0, one)
+    refused = []
+    for one in singles[50:]:
+        with suppress(RecordError):
+            joiner.add(0, one)
+            continue
+        refused.append(one)
+    assert len(refused) == 0 if period == 0.01 else len(refused) > 200
+
+
+@pytest.mark.parametrize("drift", [5e-4, -5e-4, 5e-5])
+def test_a_driver_that_starts_later_is_joined_behind_a_clock_that_drifts(drift):
+    joiner = AxesJoiner(2, PERIOD)
+    joined = []
+    for first in range(0, 60_000, 100):
+        for number in range(2):
+            if number == 0 or first >= 30_000:
+                joiner.add(number, block(0, first, 100, shift=drift * PERIOD * first))
+        joined += joiner.take()
+    assert (np.diff(times(joined), axis=1) == 0).all()
+    assert not joiner.moves
+
+
+def test_samples_of_one_stream_that_are_dropped_are_no_pause():
+    joiner = AxesJoiner(2, PERIOD)
+    joined = []
+    for first in (0, 100, 200, 600):  # both pause from 300 to 600; the second loses the block before
+        joiner.add(0, replace(block(0, first, 100), follows_gap=first == 600))
+        if first != 200:
+            joiner.add(1, replace(block(0, first, 100), follows_gap=first == 600))
+        joined += joiner.take()
+    (after,) = [one for one in joined if one.missing]
+    assert after.missing == 400
+    assert not after.follows_gap
 
 
 def test_a_stream_whose_clock_stands_costs_no_memory():

@@ -126,6 +126,9 @@ def test_an_actuator_that_does_not_move_keeps_its_unknown_state():
     assert answers[-1].warming_up
 
 
-def test_other_numbers_of_axes_are_refused():
+def test_other_numbers_of_axes_are_refused_and_leave_the_state_unknown():
+    predictor = AxesPredictor(MODEL)
+    predictor.predict(np.zeros((5, 2)), np.zeros((5, 2)), restarted=True)
     with pytest.raises(RecordError, match="got 3 drives and 2 displacements, expected 2 and 2"):
-        AxesPredictor(MODEL).predict(np.zeros((5, 3)), np.zeros((5, 2)))
+        predictor.predict(np.zeros((5, 3)), np.zeros((5, 2)))
+    assert predictor.predict(np.zeros((5, 2)), np.zeros((5, 2))).warming_up

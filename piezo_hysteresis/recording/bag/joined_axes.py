@@ -88,7 +88,7 @@ class JoinedAxes:
                 f"{', '.join(self._axes)}: got no samples of the same time, expected drivers that run together"
             )
         channels: dict[str, Samples] = {}
-        was_driven, pauses = False, set(common.tolist())
+        was_driven = False
         for axis, numbers in zip(axes, kept, strict=True):
             _, first, _ = np.intersect1d(numbers, common, return_indices=True)
             values = axis.channels
@@ -96,11 +96,16 @@ class JoinedAxes:
                 for name in axes_of(values, quantity):
                     number = sum(channel.startswith(quantity) for channel in channels) + 1
                     channels[f"{quantity}_{number}" if number > 1 else quantity] = values[name][first]
-            was_driven |= axis.was_driven(int(first[0]))
-            pauses &= {int(numbers[at]) for at in axis.paused}
+            was_driven |= axis.was_driven(numbers, int(common[0]))
         steps = np.diff(common)
         holes = {int(at) + 1: int(steps[at]) - 1 for at in np.flatnonzero(steps > 1)}
-        paused = {at: count for at, count in holes.items() if int(common[at]) in pauses}
+        pauses = set.intersection(*({int(n[at]) for at in a.paused} for a, n in zip(axes, kept, strict=True)))
+        inside = [any(((n > common[at - 1]) & (n < common[at])).any() for n in kept) for at in holes]
+        paused = {
+            at: count
+            for (at, count), measured in zip(holes.items(), inside, strict=True)
+            if int(common[at]) in pauses and not measured
+        }
         breaks = {at: count for at, count in holes.items() if at not in paused}
         return Segment(channels, period, int(was_driven), 0.0, received_ns, 0, breaks, paused, True)
 
@@ -119,11 +124,12 @@ class _Axis:
 
     def add(self, block: BlockMessage) -> None:
         begin, n = len(self._index), block.phase.size
+        names = {name for quantity in ("voltage", "displacement") for name in axes_of(block.channels, quantity)}
         if not self._channels:
-            self._channels = {name: Column(np.float64) for name in block.channels}
-        if block.channels.keys() != self._channels.keys() or block.index is None or block.time is None:
+            self._channels = {name: Column(np.float64) for name in sorted(names)}
+        if names != self._channels.keys() or block.index is None or block.time is None:
             raise RecordingError(
-                f"{self.name}: got a block with {', '.join(block.channels)}, expected time, index and "
+                f"{self.name}: got a block with {', '.join(sorted(names))}, expected time, index and "
                 f"{', '.join(self._channels)} in every block"
             )
         for name, column in self._channels.items():
@@ -174,7 +180,7 @@ class _Axis:
             )
         return self._times_ns[0] + float(np.median(begins))
 
-    def was_driven(self, first: int) -> bool:
-        """Whether the stage had been driven, or was moving, before the sample that arrived as number `first`."""
-        before = self._channels["voltage"].array()[: first + 1]
-        return bool(self._phase.array()[0] != 0 or np.ptp(before) > 0)
+    def was_driven(self, numbers: NDArray[np.int64], first: int) -> bool:
+        """Whether the stage had been driven, or was moving, before the sample with number `first` among `numbers`."""
+        before = self._channels["voltage"].array()[numbers <= first]
+        return bool(self._phase.array()[np.argmin(numbers)] != 0 or np.ptp(before) > 0)

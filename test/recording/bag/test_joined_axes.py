@@ -148,6 +148,13 @@ def test_a_pause_of_all_devices_is_not_a_loss(tmp_path, both):
     assert ("pause" in kinds(experiment)) == both
 
 
+def test_a_pause_in_which_one_driver_measured_is_a_loss(tmp_path):
+    messages = [(d, n, 0.0, n == 4) for n in (0, 1, 2, 4, 5) for d in range(2) if (d, n) != (1, 2)]
+    experiment = played(tmp_path / "bag", messages)
+    assert [record.truncated for record in experiment] == [False, True]
+    assert "gap" in kinds(experiment)
+
+
 def test_a_namespace_given_twice_is_refused(tmp_path):
     bag, _ = recorded(tmp_path / "bag")
     with pytest.raises(RecordingError, match="expected every namespace once"):
