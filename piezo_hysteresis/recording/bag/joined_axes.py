@@ -100,12 +100,13 @@ class JoinedAxes:
         steps = np.diff(common)
         holes = {int(at) + 1: int(steps[at]) - 1 for at in np.flatnonzero(steps > 1)}
         pauses = set.intersection(*({int(n[at]) for at in a.paused} for a, n in zip(axes, kept, strict=True)))
-        inside = [any(((n > common[at - 1]) & (n < common[at])).any() for n in kept) for at in holes]
-        paused = {
-            at: count
-            for (at, count), measured in zip(holes.items(), inside, strict=True)
-            if int(common[at]) in pauses and not measured
-        }
+
+        def is_pause(at: int) -> bool:
+            """Whether all drivers announced the hole before sample `at`, and none measured in it."""
+            inside = (((n > common[at - 1]) & (n < common[at])).any() for n in kept)
+            return int(common[at]) in pauses and not any(inside)
+
+        paused = {at: count for at, count in holes.items() if is_pause(at)}
         breaks = {at: count for at, count in holes.items() if at not in paused}
         return Segment(channels, period, int(was_driven), 0.0, received_ns, 0, breaks, paused, True)
 
