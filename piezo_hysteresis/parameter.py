@@ -27,6 +27,15 @@ from .errors import ParameterError
 Value = float | tuple[float, ...]
 
 
+def parts_of(text: str) -> list[str]:
+    """Parts of a text with commas between them, without blanks around them and without empty ones.
+
+    >>> parts_of("/stage_x, /stage_y,")
+    ['/stage_x', '/stage_y']
+    """
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
 def slew_text(rate: float, digits: int = 6) -> str:
     """A rate of change of a voltage as text, never with an exponent of ten.
 

@@ -19,7 +19,7 @@ Fields are found by name and offset, never by position.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple, Protocol
 
@@ -57,6 +57,15 @@ class PointLayout(NamedTuple):
     name: str
     offset: int
     datatype: int
+
+
+def with_further(layout: Mapping[str, str], columns: Iterable[str]) -> dict[str, str]:
+    """The layout, and behind it every column that it does not name, as float64.
+
+    >>> with_further({"voltage": "f8", "phase": "u4"}, ["voltage", "temperature"])
+    {'voltage': 'f8', 'phase': 'u4', 'temperature': 'f8'}
+    """
+    return {**layout, **{name: "f8" for name in columns if name not in layout}}
 
 
 def point_type(layout: Mapping[str, str]) -> np.dtype:

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from ..errors import IdentificationError
 from ..model.axes_model import LINEAR_TERMS, AxesModel
@@ -139,13 +138,7 @@ def identify_axes(
             model = replace(model, elongation=elongation, radii=scales * size)
         if number < passes - 1:
             model = replace(model, taps=np.concatenate((model.taps, np.zeros((1, *model.taps.shape[1:])))))
-    return replace(model, level_max=max(largest_level(u, model) for u in voltages))
-
-
-def largest_level(voltages: Array, model: AxesModel) -> float:
-    """Largest running rms of drives (n, m) that begin at rest [V], with the time constant of a model."""
-    decay = np.exp(-model.sample_period / model.memory)
-    return float(np.sqrt(lfilter([1.0 - decay], [1.0, -decay], np.mean(voltages**2, axis=1)).max()))
+    return replace(model, level_max=max(float(model.levels(u).max()) for u in voltages))
 
 
 def axes_errors(model: AxesModel, records: Sequence[Record]) -> list[AxisError]:

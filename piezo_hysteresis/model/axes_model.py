@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.signal import lfilter
 
 from ..blocks.coupled_axes import coupled_axes
 from ..errors import ModelError
@@ -143,6 +144,10 @@ class AxesModel:
     def settling(self) -> int:
         """Number of samples after which a wrong initial state has decayed, apart from that of slow plays."""
         return int(self.taps.shape[0] * self.taps.shape[2] + 5 * self.memory / self.sample_period)
+
+    def levels(self, voltages: Array) -> Array:
+        """Running rms of drives (n, m) that begin at rest, shape (n,) [V]."""
+        return np.sqrt(lfilter([1.0 - self._decay], [1.0, -self._decay], np.mean(voltages**2, axis=1)))
 
     def rest(self) -> AxesState:
         """State of a stage that has rested at 0 V."""

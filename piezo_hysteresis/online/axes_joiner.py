@@ -68,7 +68,6 @@ class _Stream:
 
     check: SequenceCheck
     waiting: deque[tuple[int, SampleBlock]] = field(default_factory=deque)
-    count: int = 0
     end: int | None = None
     skew: float = 0.0
     since: tuple[int, int] | None = None
@@ -77,24 +76,21 @@ class _Stream:
     def add(self, first: int, block: SampleBlock, most: int) -> None:
         """Append a block, and drop old ones beyond a number of samples; the new one stays."""
         self.waiting.append((first, block))
-        self.count += block.size
         self.end = first + block.size
-        while len(self.waiting) > 1 and self.count - self.waiting[0][1].size >= most:
-            self.count -= self.waiting.popleft()[1].size
+        while len(self.waiting) > 1 and self.end - self.waiting[1][0] >= most:
+            self.waiting.popleft()
 
     def drop_before(self, number: int) -> None:
         """Drop the samples before a number."""
         while self.waiting and self.waiting[0][0] < number:
             first, block = self.waiting.popleft()
-            dropped = min(block.size, number - first)
-            self.count -= dropped
-            if dropped < block.size:
-                self.waiting.appendleft((number, block.between(dropped, block.size)))
+            if first + block.size > number:
+                self.waiting.appendleft((number, block.between(number - first, block.size)))
 
     def forget(self) -> None:
         """Drop all samples, and the relation to the other streams."""
         self.waiting.clear()
-        self.count, self.end = 0, None
+        self.end = None
 
 
 class AxesJoiner:
@@ -173,17 +169,18 @@ class AxesJoiner:
         if not block.size:
             return
         time = _time(block)
-        if arrival.restarted and self._origin is not None and stream.end is not None:
+        if arrival.restarted and stream.end is not None:
             self._begin()
-        first = self._number_at(time, self._drift(number)) if stream.end is None else stream.end + arrival.missing
-        skew = self._skew(time, first)
-        move = self._move(number, skew)
+        elapsed = self._elapsed(time)
+        others = [s.skew for s in self._streams if s is not stream and s.end is not None]
+        drift = others[0] if others else 0.0  # of the clocks against the numbers, since the streams began
+        first = round((elapsed - drift) / self.sample_period) if stream.end is None else stream.end + arrival.missing
+        stream.skew = elapsed - first * self.sample_period
+        move = max((stream.skew - other for other in others), key=abs, default=0.0)
         if abs(move) > max(LARGEST_SKEW, self.sample_period):
             self.moves.append((number, move))
             self._begin()
-            first = self._number_at(time)
-            skew = self._skew(time, first)
-        stream.skew = skew
+            first, stream.skew = 0, self._elapsed(time)
         stream.add(first, block, round(LONGEST_WAIT / self.sample_period))
 
     def take(self) -> Iterator[JoinedBlock]:
@@ -211,25 +208,11 @@ class AxesJoiner:
             stream.forget()
         self._origin = self._next = None
 
-    def _number_at(self, time: int, drift: float = 0.0) -> int:
-        """Number of the sample at a time [ns], for clocks that have drifted [s]; the first time asked for gets 0."""
+    def _elapsed(self, time: int) -> float:
+        """Time since the first one after the streams began [s]; `time` in ns."""
         if self._origin is None:
             self._origin = time
-        return round(((time - self._origin) * 1e-9 - drift) / self.sample_period)
-
-    def _drift(self, number: int) -> float:
-        """How far the stamps of another stream, if one is known, have moved against its index [s]."""
-        others = (s.skew for k, s in enumerate(self._streams) if k != number and s.end is not None)
-        return next(others, 0.0)
-
-    def _skew(self, time: int, number: int) -> float:
-        """Time of a sample after that of its number [s]."""
-        return 0.0 if self._origin is None else (time - self._origin) * 1e-9 - number * self.sample_period
-
-    def _move(self, number: int, skew: float) -> float:
-        """How much further the stamps of a stream have moved than those of another one, at most [s]."""
-        others = [s.skew for k, s in enumerate(self._streams) if k != number and s.end is not None]
-        return max((skew - other for other in others), key=abs, default=0.0)
+        return (time - self._origin) * 1e-9
 
     def _require_period(self, stream: _Stream, block: SampleBlock) -> None:
         """Refuse another sample period; that of single samples follows from their stamps, about once a second."""

@@ -26,7 +26,7 @@ from ...acquisition.session import DriverSession
 from ...errors import PiezoError, StageError, printable
 from ..messages.conversions import from_stamp, phase_text_of, waveform_from_cloud
 from ..messages.phase_text import phase_and_owner
-from ..runtime.guarded_node import GuardedNode
+from ..runtime.guarded_node import LOG_INTERVAL, GuardedNode
 from ..runtime.node_clock import now
 from ..topics import subscribe
 from .claims import DriverClaims
@@ -36,9 +36,6 @@ from .stop_services import StopServices
 
 _LONGEST_NAME = 64
 """Largest number of characters of a phase name."""
-
-_LOG_INTERVAL = 0.1
-"""Shortest time between two lines of one kind in the log [s]: a flood of commands must not fill the disk."""
 
 _SET_POINT_INTERVAL = 1.0
 """Shortest time between two lines about set-points [s], which a program may send continuously."""
@@ -104,7 +101,7 @@ class DriverCommands:
             self._refuse(name, stamp, error)
         else:
             message = f"playing {phase}: {waveform.size * session.sample_period:g} s"
-            self._node.get_logger().info(message, throttle_duration_sec=_LOG_INTERVAL)
+            self._node.get_logger().info(message, throttle_duration_sec=LOG_INTERVAL)
 
     def _on_set_voltage(self, message: Float64) -> None:
         try:
@@ -140,7 +137,7 @@ class DriverCommands:
         if not was_playing:
             topics.stopped(phase)
         message = f"on the way to the safe voltage, {session.limits.safe_voltage:g} V"
-        self._node.get_logger().info(f"stopped {phase}: {message}", throttle_duration_sec=_LOG_INTERVAL)
+        self._node.get_logger().info(f"stopped {phase}: {message}", throttle_duration_sec=LOG_INTERVAL)
         return message
 
     def _refuse(self, name: str, stamp: int, reason: PiezoError) -> None:
@@ -149,6 +146,6 @@ class DriverCommands:
         if name == "set_voltage":  # rclpy limits the rate separately for every line of code
             self._node.get_logger().warning(message, throttle_duration_sec=_SET_POINT_INTERVAL)
         else:
-            self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
+            self._node.get_logger().warning(message, throttle_duration_sec=LOG_INTERVAL)
         if self._attached is not None:
             self._attached[1].refused(name, stamp, str(reason))

@@ -28,7 +28,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import PointCloud2
 
 from ...errors import RecordError
-from ...point_cloud import point_type, stored_as, unpacked
+from ...point_cloud import point_type, stored_as, unpacked, with_further
 from .cloud import from_cloud, to_cloud
 
 _STAMP = struct.Struct("=iI")
@@ -74,16 +74,16 @@ class CloudWriter:
     Parameters
     ----------
     layout : mapping of str to str
-        Field names in the order of the point, with their numpy types.
+        Field names in the order of the point, with their numpy types. Further columns follow as float64.
     """
 
     def __init__(self, layout: Mapping[str, str]) -> None:
         self._layout = layout
-        self._common: tuple[int, str] | None = None
+        self._common: tuple[int, str, tuple[str, ...]] | None = None
 
     def write(self, columns: Mapping[str, ArrayLike], stamp: Time, frame_id: str = "", *, dense: bool = True) -> bytes:
         """Serialised cloud; parameters as for `to_cloud`; the first column gives the number of points."""
-        common = np.size(next(iter(columns.values()))), frame_id
+        common = np.size(next(iter(columns.values()))), frame_id, tuple(columns)
         if common != self._common:
             self._begin(*common)
             self._common = common
@@ -94,11 +94,12 @@ class CloudWriter:
         message[self._frame.stop] = dense
         return bytes(message)
 
-    def _begin(self, size: int, frame_id: str) -> None:
-        blank = {name: np.zeros(size, word) for name, word in self._layout.items()}
-        self._frame = _Frame(to_cloud(blank, self._layout, Time(), frame_id))
-        points = np.frombuffer(self._frame.message, point_type(self._layout), size, self._frame.start)
-        self._fields = {name: points[name] for name in self._layout}
+    def _begin(self, size: int, frame_id: str, names: tuple[str, ...]) -> None:
+        layout = with_further(self._layout, names)
+        blank = {name: np.zeros(size, word) for name, word in layout.items()}
+        self._frame = _Frame(to_cloud(blank, layout, Time(), frame_id))
+        points = np.frombuffer(self._frame.message, point_type(layout), size, self._frame.start)
+        self._fields = {name: points[name] for name in layout}
 
 
 class CloudReader:
@@ -110,11 +111,11 @@ class CloudReader:
     ----------
     required : mapping of str to str
         Field names and the numpy types wanted.
-    further : callable, optional
-        Whether a field of another name is read too, as float64; default none.
+    further : callable
+        Whether a field of another name is read too, as float64; by default none is.
     """
 
-    def __init__(self, required: Mapping[str, str], further: Callable[[str], object] | None = None) -> None:
+    def __init__(self, required: Mapping[str, str], further: Callable[[str], object] = lambda name: False) -> None:
         self._required, self._further = required, further
         self._known: _Known | None = None
 
@@ -132,8 +133,8 @@ class CloudReader:
             cloud = deserialize_message(message, PointCloud2)
         except RuntimeError as error:  # a middleware may raise any error
             raise RecordError(f"cloud: got {len(message)} bytes of something else, expected a cloud") from error
-        names = [field.name for field in cloud.fields] if self._further else []
-        others = {name: "f8" for name in names if name not in self._required and self._further and self._further(name)}
+        names = (field.name for field in cloud.fields)
+        others = {name: "f8" for name in names if name not in self._required and self._further(name)}
         columns = read_cloud(cloud, self._required, others)
         self._known = _Known(cloud, message, self._required, others)
         return columns

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -26,6 +26,7 @@ from sensor_msgs.msg import PointCloud2
 from ...acquisition.sample_block import SampleBlock
 from ...channel_mapping import quantity_of
 from ...errors import RecordError, printable
+from ...point_cloud import with_further
 from .cloud import to_cloud
 from .cloud_stream import CloudReader, CloudWriter, Columns, read_cloud
 from .conversions import PERIOD_TOLERANCE, Samples, from_stamp, to_stamp
@@ -56,7 +57,7 @@ _LARGEST = {"voltage": 1e4, "displacement": 1.0}
 
 def samples_to_cloud(block: SampleBlock) -> PointCloud2:
     """Message of `samples`."""
-    layout = _with(SAMPLES, block.channels)
+    layout = with_further(SAMPLES, block.channels)
     return to_cloud(block.columns, layout, to_stamp(block.stamp), block.frame, dense=not block.follows_gap)
 
 
@@ -64,12 +65,11 @@ class SampleWriter:
     """Serialised messages of `samples`: the bytes of `samples_to_cloud`, for a stream of blocks."""
 
     def __init__(self) -> None:
-        self._writer = _GrowingWriter(SAMPLES)
+        self._writer = CloudWriter(SAMPLES)
 
     def write(self, block: SampleBlock) -> bytes:
         """Message of one block."""
-        writer = self._writer.of(block.channels)
-        return writer.write(block.columns, to_stamp(block.stamp), block.frame, dense=not block.follows_gap)
+        return self._writer.write(block.columns, to_stamp(block.stamp), block.frame, dense=not block.follows_gap)
 
 
 def samples_from_cloud(cloud: PointCloud2) -> SampleBlock:
@@ -89,11 +89,11 @@ class SampleReader:
 
     Parameters
     ----------
-    further : callable, optional
-        Whether a channel of a given name is read besides voltage and displacement; default none.
+    further : callable
+        Whether a channel of a given name is read besides voltage and displacement; by default none is.
     """
 
-    def __init__(self, further: Callable[[str], object] | None = None) -> None:
+    def __init__(self, further: Callable[[str], object] = lambda name: False) -> None:
         self._reader = CloudReader(SAMPLES, further)
 
     def read(self, message: bytes) -> SampleBlock:
@@ -148,7 +148,7 @@ class PredictionWriter:
     """Serialised messages of `predicted_samples`."""
 
     def __init__(self) -> None:
-        self._writer = _GrowingWriter(PREDICTED_SAMPLES)
+        self._writer = CloudWriter(PREDICTED_SAMPLES)
 
     def write(self, block: SampleBlock, results: Mapping[str, Samples], model: int, *, valid: bool = True) -> bytes:
         """Message for the samples of a block.
@@ -172,25 +172,4 @@ class PredictionWriter:
             "model": model,
             **results,
         }
-        further = [name for name in results if name not in PREDICTED_SAMPLES]
-        return self._writer.of(further).write(columns, to_stamp(block.stamp), block.frame, dense=valid)
-
-
-class _GrowingWriter:
-    """A `CloudWriter` for a layout with further fields, which hardly ever change."""
-
-    def __init__(self, layout: Mapping[str, str]) -> None:
-        self._layout = layout
-        self._names: tuple[str, ...] = ()
-        self._writer = CloudWriter(layout)
-
-    def of(self, further: Iterable[str]) -> CloudWriter:
-        """The writer for some further fields."""
-        names = tuple(further)
-        if names != self._names:
-            self._names, self._writer = names, CloudWriter(_with(self._layout, names))
-        return self._writer
-
-
-def _with(layout: Mapping[str, str], further: Iterable[str]) -> dict[str, str]:
-    return {**layout, **{name: "f8" for name in further if name not in layout}}
+        return self._writer.write(columns, to_stamp(block.stamp), block.frame, dense=valid)

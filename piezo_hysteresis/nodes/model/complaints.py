@@ -16,16 +16,17 @@
 
 from __future__ import annotations
 
-from ..runtime.guarded_node import GuardedNode
+from collections.abc import Iterator
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from ..runtime.guarded_node import LOG_INTERVAL, GuardedNode
 
 _LONGEST = 500
 """Largest number of characters of a reason that is repeated every second."""
 
 _MOST = 8
 """Largest number of different problems that are reported together."""
-
-_LOG_INTERVAL = 0.1
-"""Shortest time between two lines of one kind in the log [s]: a stream of faults must not fill the disk."""
 
 
 class Complaints:
@@ -48,21 +49,24 @@ class Complaints:
         self._refused = ""
         self.count = 0
 
-    @property
-    def messages(self) -> tuple[str, ...]:
-        """What is to be reported now."""
-        return tuple(filter(None, (self._refused, *self._problems)))
+    def findings(self) -> Iterator[tuple[bytes, str]]:
+        """Level and message of what is to be reported now; also that a clock is missing."""
+        clock = self._node.get_clock()
+        if clock.ros_time_is_active and clock.now().nanoseconds == 0:
+            yield DiagnosticStatus.WARN, "use_sim_time is true, and no message arrives on /clock"
+        for message in filter(None, (self._refused, *self._problems)):
+            yield DiagnosticStatus.ERROR, message
 
     def problem(self, message: str) -> None:
         """Report a problem in one line, now and until it has been `shown`."""
         self.count += 1
         if message[:_LONGEST] not in self._problems and len(self._problems) < _MOST:
-            self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
+            self._node.get_logger().warning(message, throttle_duration_sec=LOG_INTERVAL)
             self._problems.append(message[:_LONGEST])
 
     def refused(self, message: str) -> None:
         """Report why a model was refused, until another model is accepted."""
-        self._node.get_logger().warning(message, throttle_duration_sec=_LOG_INTERVAL)
+        self._node.get_logger().warning(message, throttle_duration_sec=LOG_INTERVAL)
         self._refused = message[:_LONGEST]
         self.count += 1
 

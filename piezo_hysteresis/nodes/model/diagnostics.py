@@ -29,15 +29,12 @@ from ...model.model_parameters import model_hash
 from ...online.predictor import Predictor
 from ...record import Notice
 from ..messages.conversions import diagnostic
-from ..runtime.guarded_node import GuardedNode
+from ..runtime.guarded_node import LOG_INTERVAL, GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
 from .change_reporter import ChangeReporter
 from .complaints import Complaints
 from .residual_alarm import ResidualAlarm
-
-_LOG_INTERVAL = 0.1
-"""Shortest time between two lines about models in the log [s]: a stream of models must not fill the disk."""
 
 
 class ModelDiagnostics:
@@ -85,7 +82,7 @@ class ModelDiagnostics:
         except (KeyError, ValueError):
             self._free_run_error = None
         message = f"model {model_hash(model)}: {', '.join(e.name for e in model.effects)}"
-        self._node.get_logger().info(message, throttle_duration_sec=_LOG_INTERVAL)
+        self._node.get_logger().info(message, throttle_duration_sec=LOG_INTERVAL)
 
     def follow(self, predictor: Predictor) -> None:
         """Report the counters of a predictor from now on."""
@@ -141,11 +138,9 @@ class ModelDiagnostics:
 
     def _findings(self, received: bool, lost: int, repeated: int) -> Iterator[tuple[bytes, str]]:
         predictor = self._predictor
-        clock = self._node.get_clock()
-        if clock.ros_time_is_active and clock.now().nanoseconds == 0:
-            yield DiagnosticStatus.WARN, "use_sim_time is true, and no message arrives on /clock"
-        for message in filter(None, (*self._complaints.messages, self._node.recent_fault)):
-            yield DiagnosticStatus.ERROR, message
+        yield from self._complaints.findings()
+        if fault := self._node.recent_fault:
+            yield DiagnosticStatus.ERROR, fault
         if predictor is None or not received:
             yield DiagnosticStatus.STALE, "no samples"
             return

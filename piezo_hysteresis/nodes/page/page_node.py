@@ -23,7 +23,7 @@ from concurrent.futures import Future as Reply
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 
-from ...parameter import Row, Setting
+from ...parameter import Row, Setting, parts_of
 from ...report.live.access import read_token
 from ...report.live.axis_state import AxisState
 from ...report.live.live_page import LivePage
@@ -58,7 +58,7 @@ class PageNode(GuardedNode):
         super().__init__("page_node")
         declare(self, PAGE, read_only=True)
         values = read(self, PAGE)
-        self._named = _split(values["axes"])
+        self._named = parts_of(values["axes"])
         self._feeds: dict[str, AxisFeed] = {}
         for axis in self._named:
             self._follow(axis)
@@ -70,7 +70,7 @@ class PageNode(GuardedNode):
             values["address"],
             values["port"],
             token,
-            _split(values["hosts"]),
+            parts_of(values["hosts"]),
         )
         self.get_logger().info(f"open {self._server.url} in a browser")
 
@@ -106,10 +106,6 @@ class PageNode(GuardedNode):
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
         for status in array.status:
             any(feed.report(status) for feed in self._feeds.values())
-
-
-def _split(text: str) -> list[str]:
-    return [part.strip() for part in text.split(",") if part.strip()]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -33,8 +33,8 @@ from ..messages.conversions import diagnostic, values_of
 _REMEMBERED = 10.0
 """Time for which a fault is shown on /diagnostics [s]."""
 
-_LOG_INTERVAL = 0.1
-"""Shortest time between two lines about faults in the log [s]: a stream of faults must not fill the disk."""
+LOG_INTERVAL = 0.1
+"""Shortest time between two lines of one kind in the log [s]: a stream of faults or messages must not fill the disk."""
 
 
 def _refuse_another_clock(parameters: list[Parameter]) -> SetParametersResult:
@@ -76,7 +76,7 @@ class GuardedNode(Node):
         place = f" ({places[-1].filename}:{places[-1].lineno})" if places else ""
         self.faults += 1
         self._newest_fault, self._fault_time = reason_of(error), time.monotonic()
-        self.get_logger().error(f"{self._newest_fault}{place}", throttle_duration_sec=_LOG_INTERVAL)
+        self.get_logger().error(f"{self._newest_fault}{place}", throttle_duration_sec=LOG_INTERVAL)
 
     def reported(self, status: DiagnosticStatus) -> DiagnosticArray:
         """A stamped status for /diagnostics with the faults so far. A recent fault raises its level."""

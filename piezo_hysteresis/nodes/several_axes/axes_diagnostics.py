@@ -131,11 +131,7 @@ class AxesDiagnostics:
         send(self._publisher, self._node.reported(diagnostic(level, self._name, message, self._frame, **values)))
 
     def _findings(self, joined: int, lost: int, repeated: int) -> Iterator[tuple[bytes, str]]:
-        clock = self._node.get_clock()
-        if clock.ros_time_is_active and clock.now().nanoseconds == 0:
-            yield DiagnosticStatus.WARN, "use_sim_time is true, and no message arrives on /clock"
-        for message in self._complaints.messages:
-            yield DiagnosticStatus.ERROR, message
+        yield from self._complaints.findings()
         silent = [
             name
             for name, newest in zip(self._streams, self._newest, strict=True)

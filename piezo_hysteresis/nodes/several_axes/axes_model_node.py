@@ -32,8 +32,8 @@ from ...model.axes_model import AxesModel
 from ...model.model_parameters import first_bits
 from ...online.axes_joiner import AxesJoiner, JoinedBlock
 from ...online.axes_predictor import AxesPredictor
-from ...parameter import Row, Setting
-from ..model.publishers import LIVE
+from ...parameter import Row, Setting, parts_of
+from ..model.publishers import LIVE, Predicted
 from ..model.residual_alarm import ALARM
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.launch_values import LISTENING
@@ -41,7 +41,7 @@ from ..runtime.node_clock import now
 from ..runtime.parameters import declare, let_change, read
 from ..runtime.process import run
 from .axes_diagnostics import AxesDiagnostics
-from .axis_stream import AxisStream, columns, slices
+from .axis_stream import AxisStream, columns, results_of, slices
 
 AXES: tuple[Row, ...] = (
     Setting("model_file", "", "path of a model of several axes, an NPZ file of piezo identify"),
@@ -79,7 +79,7 @@ class AxesModelNode(GuardedNode):
 
     def _namespaces(self, given: str) -> list[str]:
         """Namespaces in the parameter `axes`; RecordError if one is invalid, or given twice."""
-        names = [part.strip() for part in given.split(",") if part.strip()]
+        names = parts_of(given)
         try:
             topics = {self.resolve_topic_name(f"{name.rstrip('/')}/samples") for name in names}
         except (ValueError, InvalidTopicNameException, rclpy_implementation.RCLError):
@@ -124,16 +124,10 @@ class AxesModelNode(GuardedNode):
             follows_gap=joined.follows_gap,
         )
         for stream, block, axes in zip(self._streams, joined.blocks, slices(joined.blocks), strict=True):
-            stream.publish(
-                block,
-                answer.prediction[:, axes],
-                answer.residual[:, axes],
-                predictor.residual_rms[axes.start],
-                self._number,
-                answer.warming_up,
-                joiner.joined,
-                joiner.sample_period,
-            )
+            results = results_of(block, answer.prediction[:, axes], answer.residual[:, axes])
+            rms = predictor.residual_rms[axes.start]
+            predicted = Predicted(block, results, self._number, answer.warming_up, rms)
+            stream.topics.publish(predicted, joiner.joined, joiner.sample_period)
         self._diagnostics.reached(predictor.level)
 
     def _load(self, path: str) -> None:

@@ -25,7 +25,7 @@ from rclpy.node import Node
 from ...acquisition.sample_block import SampleBlock
 from ...channel_mapping import axes_of, axis_of
 from ..messages.samples import SampleReader
-from ..model.publishers import ModelTopics, Predicted
+from ..model.publishers import ModelTopics
 from ..topics import subscribe
 
 Array = NDArray[np.float64]
@@ -49,13 +49,15 @@ class AxisStream:
         The namespace.
     axes : tuple of int, or None
         Numbers of voltages and of displacements in the newest block; None before the first one.
+    topics : ModelTopics
+        Publishers of the predictions.
     """
 
     def __init__(self, node: Node, namespace: str, received: Callable[[bytes], None]) -> None:
         self.name = namespace or node.get_namespace()
         self.axes: tuple[int, int] | None = None
         self._reader = SampleReader(axis_of)
-        self._topics = ModelTopics(node, namespace)
+        self.topics = ModelTopics(node, namespace)
         subscribe(node, "samples", received, namespace, deep=True, raw=True)
 
     def read(self, message: bytes) -> SampleBlock:
@@ -64,25 +66,16 @@ class AxisStream:
         self.axes = len(axes_of(block.channels, "voltage")), len(axes_of(block.channels, "displacement"))
         return block
 
-    def publish(
-        self,
-        block: SampleBlock,
-        prediction: Array,
-        residual: Array,
-        rms: float | None,
-        model: int,
-        warming_up: bool,
-        received: int,
-        sample_period: float,
-    ) -> None:
-        """Publish prediction and residual (n, p) of the displacements of this stream; the others as in `Predicted`."""
-        results: dict[str, Array] = {}
-        for name, y, e in zip(axes_of(block.channels, "displacement"), prediction.T, residual.T, strict=True):
-            number = name.removeprefix("displacement")
-            results |= {f"prediction{number}": y, f"residual{number}": e}
-            if number:
-                results[name] = block.channels[name]
-        self._topics.publish(Predicted(block, results, model, warming_up, rms), received, sample_period)
+
+def results_of(block: SampleBlock, prediction: Array, residual: Array) -> dict[str, Array]:
+    """Prediction and residual (n, p) of the displacements of a block, by the names of `PredictionWriter.write`."""
+    results: dict[str, Array] = {}
+    for name, y, e in zip(axes_of(block.channels, "displacement"), prediction.T, residual.T, strict=True):
+        number = name.removeprefix("displacement")
+        results |= {f"prediction{number}": y, f"residual{number}": e}
+        if number:
+            results[name] = block.channels[name]
+    return results
 
 
 def columns(blocks: tuple[SampleBlock, ...], quantity: str) -> Array:

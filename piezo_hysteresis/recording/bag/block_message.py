@@ -26,7 +26,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from ...channel_mapping import quantity_of
-from ...point_cloud import packed, point_layout, stored_as, unpacked
+from ...point_cloud import packed, point_layout, stored_as, unpacked, with_further
 from ...record import Samples
 
 TYPE = "sensor_msgs/msg/PointCloud2"
@@ -111,7 +111,7 @@ class BlockMessage:
             "index": none if self.index is None else self.index,
             "phase": self.phase,
         }
-        layout = FIELDS | dict.fromkeys(sorted(self.channels.keys() - _REQUIRED.keys()), "f8")
+        layout = with_further(FIELDS, sorted(self.channels))
         points = packed(self.channels | numbers, layout)
         kinds = typestore().types
         stamp = kinds["builtin_interfaces/msg/Time"](*divmod(self.stamp_ns, 1_000_000_000))

@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RecordingError
+from ...parameter import parts_of
 from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming
 from ..segmentation.decimating_buffer import shared_averages
@@ -137,8 +138,7 @@ def _space(topic: str, name: str) -> str | None:
 
 def _axes(options: ReadOptions) -> list[str]:
     """Absolute namespaces in the option `axis`; RecordingError where one is given twice."""
-    parts = [] if options.axis is None else [part for part in options.axis.replace(" ", "").split(",") if part]
-    axes = [_absolute(part) for part in parts]
+    axes = [_absolute(part) for part in parts_of(options.axis or "")]
     if len(set(axes)) != len(axes):
         raise RecordingError(f"`axis`: got '{options.axis}', expected every namespace once")
     return axes

@@ -20,7 +20,9 @@ import pytest
 from piezo_hysteresis.errors import RecordingError
 from piezo_hysteresis.identification.identify_axes import axes_errors, identify_axes
 from piezo_hysteresis.model.axes_samples import columns
+from piezo_hysteresis.online import axes_joiner
 from piezo_hysteresis.recording import BagWriter, read, write
+from piezo_hysteresis.recording.bag import joined_axes
 from piezo_hysteresis.recording.bag.block_message import TYPE, BlockMessage
 
 from ...coupled_plant import plant
@@ -153,6 +155,11 @@ def test_a_pause_in_which_one_driver_measured_is_a_loss(tmp_path):
     experiment = played(tmp_path / "bag", messages)
     assert [record.truncated for record in experiment] == [False, True]
     assert "gap" in kinds(experiment)
+
+
+def test_bags_are_joined_by_the_limits_of_the_live_node():
+    assert joined_axes.LARGEST_SKEW == axes_joiner.LARGEST_SKEW
+    assert joined_axes.PERIOD_TOLERANCE == axes_joiner.PERIOD_TOLERANCE
 
 
 def test_a_namespace_given_twice_is_refused(tmp_path):
