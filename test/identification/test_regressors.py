@@ -41,15 +41,15 @@ def written_out(signals, na, nb, delay):
 @given(st.integers(0, 4), st.integers(1, 4), st.integers(1, 5), st.integers(0, 2**32 - 1))
 def test_the_triangular_factor_contains_the_inner_products_of_all_records(na, nb, delay, seed):
     random = np.random.default_rng(seed)
-    signals = [(random.normal(3.0, 1.0, n), random.normal(-20.0, 1.0, n)) for n in (30, 47)]
+    signals = [(random.normal(3.0, 1.0, n), random.normal(-20.0, 1.0, n)) for n in (30, 4700)]
     r = triangle(signals, (na, nb), delay)
     expected = written_out(signals, na, nb, delay)
     np.testing.assert_allclose(r.T @ r, expected, rtol=1e-9, atol=1e-9 * expected.max())
     assert np.array_equal(r, np.triu(r))
 
 
-def test_singular_products_are_replaced_by_a_factorisation():
-    """A sine is a combination of two of its own delays: its products are singular to rounding."""
+def test_nearly_dependent_regressors_keep_what_distinguishes_them():
+    """A sine is a combination of two of its own delays: inner products of them are singular to rounding."""
     time = np.arange(9000.0)
     signals = [(np.sin(0.01 * time), 0.3 * np.sin(0.01 * (time - 4.0)) + 1e-9 * np.cos(time))]
     r = triangle(signals, (3, 3), 1)

@@ -20,6 +20,7 @@ A(z). Steiglitz-McBride iterations (prefiltering with 1/A of the step before) re
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -165,6 +166,13 @@ def identify_arx(
     -----
     Paper, Sec. 3.3; Steiglitz and McBride 1965.
     """
+    return best_arx(signals, delay, sample_period, orders, (iterations,))[0]
+
+
+def best_arx(
+    signals: Signals, delay: int, sample_period: float, orders: tuple[int, int], iterations: Sequence[int]
+) -> list[Dynamics]:
+    """`identify_arx` with several largest numbers of iterations at once; models that are the same stand once."""
     na, nb = orders
     if na < 0 or nb < 1 or delay < 1:
         raise IdentificationError(f"ARX: got na = {na}, nb = {nb}, d = {delay}, expected na >= 0, nb >= 1, d >= 1")
@@ -173,7 +181,7 @@ def identify_arx(
     theta, left = solve(triangle(signals, orders, delay))
     one_step = left / float(np.sqrt(sum(y.size for _, y in signals)))
     candidates: list[Dynamics] = []
-    for iteration in range(iterations + 1):
+    for iteration in range(max(iterations) + 1):
         if iteration:
             whitener = np.concatenate(([1.0], candidates[-1].arx.array("a")))
             whitened = [
@@ -197,7 +205,8 @@ def identify_arx(
         errors = [c.free_run_error for c in candidates]
         if len(errors) > PATIENCE and min(errors[-PATIENCE:]) > GAINS * min(errors[:-PATIENCE]):
             break
-    return min(candidates, key=lambda model: model.free_run_error)
+    best = [min(candidates[: most + 1], key=lambda model: model.free_run_error) for most in iterations]
+    return list(dict.fromkeys(best))
 
 
 def delay_of(signals: Signals, longest: int = 16, order: int = 8, sure: float = 5.0) -> int:
