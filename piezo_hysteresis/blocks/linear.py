@@ -72,15 +72,15 @@ class LinearBlock(Block):
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         x0, z = state
         dx0, dz, own = tangent
-        m, y, rows = len(dx), np.empty((1, x.size)), np.empty((len(dx) + len(self.names), x.size))
-        deviation = x - x0
-        z_next = self.filter(deviation[None, :], z, y)
-        dz = self.filter(dx - dx0[:, None] if dx0.any() else dx, dz, rows[:m])
-        own = self.by_parameter(deviation, y[0], z[0], own, rows[m:])
+        both = np.vstack((x - x0, dx - dx0[:, None] if dx0.any() else dx))
+        outputs = np.empty((len(both) + len(self.names), x.size))
+        y, rows = outputs[0], outputs[1:]
+        z_next = self.filter(both, np.vstack((z, dz)), outputs[: len(both)])
+        own = self.by_parameter(both[0], y, z[0], own, rows[len(dx) :])
         settled = np.concatenate((self.gain * dx0, self.gain_slopes() * x0))
         if settled.any():  # not where the drive began at 0 V, as most do
             rows += settled[:, None]
-        return self.gain * x0 + y[0], rows, (x0, z_next), (dx0, dz, own)
+        return self.gain * x0 + y, rows, (x0, z_next[:1]), (dx0, z_next[1:], own)
 
 
 class AddedBlock(LinearBlock):

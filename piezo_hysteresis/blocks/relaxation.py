@@ -32,7 +32,7 @@ LANES = 4
 TILE = 256
 """Number of samples of all rows that are processed together, so that they stay in the processor's cache."""
 
-MANY = 8
+MANY = 5
 """Number of rows from which it is faster to compute them side by side."""
 
 
