@@ -31,7 +31,7 @@ from .diagnosis import Diagnosis
 from .gap import Gap, measure_gap
 from .localise import ResidualShare
 from .search.baseline_setup import BaselineSetup
-from .search.refit import LAST, PRECISE, joint, restart
+from .search.refit import LAST, PRECISE, TOLERANCE, joint, restart
 from .search.selection_result import Selection
 from .search.training_data import TrainingData
 from .unnamed.offer import best_correction
@@ -63,7 +63,8 @@ def concluded(
     """
     progress("gap", 0.85)
     whole, noise = setup.for_last_fit()
-    first = joint(selection.baseline, whole, LAST, PRECISE)
+    named = is_explained(selection)
+    first = joint(selection.baseline, whole, LAST, TOLERANCE if named else PRECISE)
 
     def gap_of(before: Model, after: Model, chosen: Sequence[int], *, offset: bool = False) -> Gap:
         unseen = chosen is setup.test_records
@@ -71,7 +72,6 @@ def concluded(
         return measure_gap(both, setup.records, chosen, least, setup.span, unseen=unseen, offset=offset)
 
     tested = setup.test_records or setup.fitted
-    named = is_explained(selection)
     falls = diverges = False
     if named:
         final = _finished(selection, whole)

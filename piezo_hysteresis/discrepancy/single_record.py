@@ -122,7 +122,7 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     short_least = floors(short, quiet)
     training_data = training_data_of(short, fitted, quiet, short_least, start)
     baseline = joint(with_zero(published), training_data, LAST, SHARP)
-    before = score_model(baseline.model, training_data)
+    before = score_model(baseline.model, training_data, baseline.linearised)
     if before.excess > ADEQUATE:
         start_helpers()  # effects will be searched for
     progress("location of the residual", 0.5)

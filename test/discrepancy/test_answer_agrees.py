@@ -31,6 +31,7 @@ from piezo_hysteresis.record import Experiment
 from piezo_hysteresis.report.figures.comparison import compare_diagnosis
 from piezo_hysteresis.report.verdict import verdict
 from piezo_hysteresis.stage.hidden import hidden_effect
+from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
 HUM = Case("poor", ("mains_hum",), 1, 5e-4, "packaged")
@@ -54,8 +55,10 @@ def test_hum_is_explained_in_the_recordings_and_not_predicted_live(with_hum):
     found = with_hum
     check_agreement(found)
     assert found.verdict is Verdict.NAMED
-    # the amplifier of this stage has a time constant below one sample, which the dynamics can contain
-    assert found.names == ("mains_hum",)
+    # the amplifier of this stage has a pole, which was not hidden
+    assert found.names == ("mains_hum", "amplifier_bandwidth")
+    low, high = found.fit.interval("amplifier_bandwidth.tau")
+    assert low < 1.0 / (2.0 * np.pi * PlantParameters().electronics.amplifier_bandwidth) < high
     assert found.gap.after < 1.3 * found.gap.floor
     assert found.gap.live > 0.5 * found.gap.before
 

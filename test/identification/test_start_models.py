@@ -19,12 +19,14 @@ import pytest
 
 from piezo_hysteresis.discrepancy.search import baseline_setup
 from piezo_hysteresis.discrepancy.search.baseline_setup import exact
+from piezo_hysteresis.discrepancy.search.refit import Fitted
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
+from piezo_hysteresis.identification.fit.normal_equations import Linearised
 from piezo_hysteresis.identification.records.noise_floor import noise_floors
 from piezo_hysteresis.identification.start_models import start_models
 from piezo_hysteresis.identification.steps.linear_start import dynamics_of
@@ -55,13 +57,15 @@ def test_a_start_from_which_the_fit_fails_hides_no_later_one(monkeypatch):
     def fitted(model, cost):
         return Fit(model, (), np.empty((0, 0)), cost, (), (), (), True, 1)
 
-    def joint(start, *_):
+    def joint(start, *_, **__):
         if start is second:
             raise DivergenceError("arx", 0, 0.0)
         return fitted(start, 1.0)
 
     monkeypatch.setattr(baseline_setup, "joint", joint)
-    monkeypatch.setattr(baseline_setup, "score_model", lambda model, _: Score(np.ones(4), np.zeros(1)))
+    perfect = Score(np.ones(4), np.zeros(1))
+    monkeypatch.setattr(baseline_setup, "scored", lambda model, _: Fitted(model, perfect, Linearised((), ())))
+    monkeypatch.setattr(baseline_setup, "score_model", lambda *_: perfect)
     poor = Score(np.full(4, 5.0), np.zeros(1))
     found = fitted(first, 25.0), poor
     for start in (second, third):

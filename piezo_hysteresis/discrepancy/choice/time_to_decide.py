@@ -25,7 +25,7 @@ import numpy as np
 
 from ...blocks.block import Array
 from ...errors import DivergenceError
-from ...identification.fit.fit import gauge
+from ...identification.fit.bounded_step import gauge
 from ...identification.fit.form_uncertainty import PIECES
 from ...identification.fit.normal_equations import grams
 from ...identification.protocol.phases import ProtocolPhase

@@ -42,7 +42,7 @@ from ...model.model import Model
 from ...record import Record
 from .candidate_refits import leaves_room
 from .candidates import score_baseline, score_model
-from .refit import FAILURES, LAST, PRECISE, joint
+from .refit import FAILURES, LAST, LATER, PRECISE, joint, scored
 from .selection_result import Selection
 from .training_data import TrainingData, choose_test_records
 
@@ -142,16 +142,17 @@ def prepare_baseline(
     lost = [np.zeros(r.size) for r in records]
     training_data = gathered(records, lost)
     progress("joint fit of the baseline", 0.2)
-    baseline = joint(start, training_data, LAST, PRECISE)
+    baseline = joint(start, training_data, LAST)
     if corrects_intersample_error:
         with suppress(DivergenceError):  # on a test record, which moves further than those that were fitted
             lost = intersample_error(known.model if known is not None else baseline.model, records)
+    begun = baseline.linearised
     if any(c.any() for c in lost):
         records = less(records, lost)
-        training_data = gathered(records, lost)
-        progress("joint fit of the baseline", 0.3)
-        baseline = joint(baseline.model, training_data, LAST, PRECISE)
-    training_data, score = score_baseline(baseline.model, training_data)
+        training_data, begun = gathered(records, lost), None
+    progress("joint fit of the baseline", 0.3)
+    baseline = joint(baseline.model, training_data, LATER, PRECISE, begun)
+    training_data, score = score_baseline(baseline, training_data)
     if leaves_room(score):
         start_helpers()  # effects will be searched for
         for other in starts:
@@ -198,11 +199,12 @@ def better_fit(
     left out. Cross-validation compares C, or V if only a `share` of V may remain.
     """
     with suppress(*FAILURES):
-        first = score_model(start, training_data)
-        if first.cost < score.cost if np.isinf(share) else first.excess < score.excess:
-            other = joint(start, training_data, LAST, PRECISE)
+        first = scored(start, training_data)
+        if first.score.cost < score.cost if np.isinf(share) else first.score.excess < score.excess:
+            other = joint(start, training_data, LAST, known=first.linearised)
             if other.cost < found.cost:
-                after = score_model(other.model, training_data)
+                other = joint(other.model, training_data, LATER, PRECISE, other.linearised)
+                after = score_model(other.model, training_data, other.linearised)
                 if after.excess < share * score.excess:
                     return other, after
     return found, score

@@ -28,7 +28,7 @@ from ...identification.fit.fit import Progress
 from ...identification.records.noise_floor import ADEQUATE
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate
-from .refit import FIRST, LATER, LINEAR, from_all_starts, proceed, refit, restart
+from .refit import FIRST, LAG, LATER, from_all_starts, proceed, refit, restart
 
 LEAST_GAIN = 0.15
 """Smallest gain in mean ln max(1, R²) for which an effect is accepted."""
@@ -60,7 +60,7 @@ def refit_candidates(
     refits = _collected(first, candidates, lambda c, found: not any(_is_far_behind(c, r, before) for r in found))
     refits.sort(key=BY_COST)
     progress("new estimate of the dynamics", 0.6)
-    anew = _collected(_anew, refits[:AGAIN], lambda c, found: not (found and _is_far_behind(c, found[0], before)))
+    anew = _collected(_anew, refits[:AGAIN], lambda c, found: not found or _is_close(c, found[0], before))
     field = _replaced(refits, anew)
     progress("refits of the best candidates", 0.8)
     last = partial(settled, before=before)
@@ -92,7 +92,7 @@ def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], be
     At the floor, what remains is small, and the dynamics absorb only a lag.
     """
     is_far = before.excess > ADEQUATE
-    bending = [c for c in candidates if _bends_dynamics(c) and (is_far or c.effect.family in LINEAR)]
+    bending = [c for c in candidates if _bends_dynamics(c) and (is_far or c.effect.family == LAG)]
     return _collected(partial(_settled, partial(from_all_starts, model), before), bending)
 
 

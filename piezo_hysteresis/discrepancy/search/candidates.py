@@ -33,10 +33,10 @@ from ...blocks.block import Array
 from ...effects import Arx, Effect, MainsHum, Offset
 from ...errors import DivergenceError, ModelError, ParameterError
 from ...identification.cores import on_cores
-from ...identification.fit.bounded_step import room_of
+from ...identification.fit.bounded_step import gauge, room_of
 from ...identification.fit.cross_validation import Score, cross_validate, indispensable
-from ...identification.fit.fit import Fit, gauge
-from ...identification.fit.normal_equations import Gram, grams
+from ...identification.fit.fit import Fit
+from ...identification.fit.normal_equations import Gram, Linearised, grams
 from ...model.model import Model
 from .training_data import TrainingData
 
@@ -114,26 +114,32 @@ def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
     return columns
 
 
-def score_model(model: Model, training_data: TrainingData) -> Score:
-    """Score of a fitted model on records left out."""
-    return _score(training_data, *_linearised(model, training_data))
+def score_model(model: Model, training_data: TrainingData, known: Linearised | None = None) -> Score:
+    """Score of a fitted model on records left out; `known` is what `linearised` would find, if a fit has found it."""
+    return _score(training_data, *_system(model, linearised(model, training_data, known)))
 
 
-def score_baseline(model: Model, training_data: TrainingData) -> tuple[TrainingData, Score]:
+def score_baseline(fit: Fit, training_data: TrainingData) -> tuple[TrainingData, Score]:
     """The training data and the score. A record that alone determines a parameter of the model is never left out."""
-    products, columns, room = _linearised(model, training_data)
+    products, columns, room = _system(fit.model, linearised(fit.model, training_data, fit.linearised))
     training_data = replace(training_data, alone=indispensable(products, training_data.floors, columns))
     return training_data, _score(training_data, products, columns, room)
 
 
-def _linearised(model: Model, training_data: TrainingData) -> tuple[list[Gram], Array, tuple[Array, Array]]:
-    names = adjusted_numbers(model, training_data)
-    products = grams(model, training_data.records, names, training_data.free_with(model))
-    columns = directions(model, names)
-    return products, columns, room_of(model, names, columns)
+def linearised(model: Model, training_data: TrainingData, known: Linearised | None = None) -> Linearised:
+    """The model linearised by the parameters that a joint fit adjusts; `known` itself, if it is by these."""
+    names = tuple(adjusted_numbers(model, training_data))
+    if known is not None and known.names == names:
+        return known
+    return Linearised(names, grams(model, training_data.records, names, training_data.free_with(model)))
 
 
-def _score(training_data: TrainingData, products: list[Gram], columns: Array, room: tuple[Array, Array]) -> Score:
+def _system(model: Model, at: Linearised) -> tuple[Sequence[Gram], Array, tuple[Array, Array]]:
+    columns = directions(model, at.names)
+    return at.grams, columns, room_of(model, at.names, columns)
+
+
+def _score(training_data: TrainingData, products: Sequence[Gram], columns: Array, room: tuple[Array, Array]) -> Score:
     return cross_validate(products, training_data.floors, columns, training_data.alone, room)
 
 

@@ -29,15 +29,19 @@ from ...errors import DivergenceError, IdentificationError, ModelError, Paramete
 from ...identification.cores import on_cores
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit, fit
+from ...identification.fit.normal_equations import Linearised
 from ...identification.fit.time_limit import check_time
-from ...identification.steps.dynamics import Dynamics, identify_arx
+from ...identification.records.noise_floor import ADEQUATE
+from ...identification.steps.dynamics import Dynamics, best_arx, identify_arx
 from ...identification.steps.linear_start import FEW_ITERATIONS, ITERATIONS, form_of, hysteresis_signals, with_dynamics
 from ...identification.steps.modes import identify_modes
 from ...model.model import Model
-from .candidates import BY_COST, Candidate, FittedCandidate, adjusted_numbers, score_model
+from .candidates import BY_COST, Candidate, FittedCandidate, adjusted_numbers, linearised, score_model
 from .training_data import TrainingData
 
-LINEAR = ("lag", "dynamics")
+LAG = "lag"
+"""Family of the effects that delay the motion."""
+LINEAR = (LAG, "dynamics")
 """Families of effects that dynamics of sufficient order can contain."""
 TOLERANCE = 1e-3
 """Relative decrease of the cost at convergence of a refit."""
@@ -51,17 +55,25 @@ FAILURES = (DivergenceError, IdentificationError, ModelError, ParameterError)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fitted:
-    """A fitted model and its score."""
+    """A model, its score, and its linearisation on the same records."""
 
     model: Model
     score: Score
+    linearised: Linearised
 
 
-def joint(model: Model, training_data: TrainingData, max_iterations: int, tolerance: float = TOLERANCE) -> Fit:
+def joint(
+    model: Model,
+    training_data: TrainingData,
+    max_iterations: int,
+    tolerance: float = TOLERANCE,
+    known: Linearised | None = None,
+) -> Fit:
     """Joint fit of all free parameters of a model to the training data.
 
-    `tolerance` is the relative decrease of the cost at convergence. The fit raises one of `FAILURES`, or a
-    TimeSpentError if the time limit of the search has passed.
+    `tolerance` is the relative decrease of the cost at convergence, `known` the linearisation of the model on these
+    records, if there is one. The fit raises one of `FAILURES`, or a TimeSpentError if the time limit of the search has
+    passed.
     """
     return fit(
         model,
@@ -71,7 +83,14 @@ def joint(model: Model, training_data: TrainingData, max_iterations: int, tolera
         nuisance=training_data.free_with(model),
         max_iterations=max_iterations,
         tolerance=tolerance,
+        known=known,
     )
+
+
+def scored(model: Model, training_data: TrainingData, known: Linearised | None = None) -> Fitted:
+    """A model with its score, from its linearisation if it is known."""
+    at = linearised(model, training_data, known)
+    return Fitted(model, score_model(model, training_data, at), at)
 
 
 def refit(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
@@ -83,13 +102,15 @@ def proceed(candidate: FittedCandidate) -> FittedCandidate:
     """Continue a refit from where it stopped; a refit that has converged is returned as it is."""
     if candidate.fit.converged:
         return candidate
-    return _refitted(candidate.fit.model, candidate, LATER) or candidate
+    return _refitted(candidate.fit.model, candidate, LATER, candidate.fit.linearised) or candidate
 
 
-def _refitted(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
+def _refitted(
+    model: Model, candidate: Candidate, max_iterations: int, known: Linearised | None = None
+) -> FittedCandidate | None:
     try:
-        result = joint(model, candidate.training_data, max_iterations)
-        score = score_model(result.model, candidate.training_data)
+        result = joint(model, candidate.training_data, max_iterations, known=known)
+        score = score_model(result.model, candidate.training_data, result.linearised)
     except FAILURES:
         return None
     return FittedCandidate(result.model[candidate.name], candidate.training_data, score, result)
@@ -99,13 +120,17 @@ def restart(candidate: FittedCandidate, max_iterations: int) -> FittedCandidate:
     """The refit with newly estimated dynamics, behind its own or the first loop; the old one if this is not better.
 
     The missing effect biased the old dynamics. A joint fit that starts with them needs many iterations. It may also
-    have changed the loop so much that no step leads back, e.g. to a width of zero.
+    have changed the loop so much that no step leads back, e.g. to a width of zero; then the error stays large.
     """
     models = [candidate.fit.model]
     if (first := candidate.training_data.start) is not None:
         models.append(reduce(Model.with_effect, [e for e in models[0].effects if e.name not in first], first))
-    found = on_cores(partial(_behind_anew, training_data=candidate.training_data), models)
-    anew = _from_best((f for _, f in found), candidate, max_iterations)
+    found = list[Fitted]()
+    behind = partial(_behind_anew, training_data=candidate.training_data)
+    for _, fitted in on_cores(behind, models, lambda model: all(f.score.excess > ADEQUATE for f in found)):
+        if fitted is not None:
+            found.append(fitted)
+    anew = _from_best(found, candidate, max_iterations)
     return candidate if anew is None or anew.fit.cost >= candidate.fit.cost else anew
 
 
@@ -122,7 +147,7 @@ def from_all_starts(model: Model, candidate: Candidate) -> FittedCandidate | Non
 
 def _from_best(starts: Iterable[Fitted | None], candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
     best = min(filter(None, starts), key=BY_COST, default=None)
-    return None if best is None else _refitted(best.model, candidate, max_iterations)
+    return None if best is None else _refitted(best.model, candidate, max_iterations, best.linearised)
 
 
 def _behind_anew(
@@ -139,14 +164,14 @@ def _behind_anew(
     found = list[Fitted]()
 
     def behind(dynamics: Dynamics) -> Fitted:
-        anew = with_dynamics(model, dynamics.arx)
-        return Fitted(anew, score_model(anew, training_data))
+        return scored(with_dynamics(model, dynamics.arx), training_data)
 
     with suppress(*FAILURES):
         signals = hysteresis_signals(model, training_data.records, broadband)
-        for iterations in choices:
-            with suppress(*FAILURES):
-                found.append(behind(identify_arx(signals, *form_of(model), iterations)))
+        with suppress(*FAILURES):
+            for dynamics in best_arx(signals, *form_of(model), choices):
+                with suppress(*FAILURES):
+                    found.append(behind(dynamics))
         if ITERATIONS in choices:
             found.append(behind(identify_modes(signals, *form_of(model), ITERATIONS)))
     return min(found, key=BY_COST, default=None)
@@ -167,8 +192,8 @@ def without(candidate: FittedCandidate) -> Fitted | None:
     fits = list[Fitted]()
     for start in filter(None, starts):
         with suppress(*FAILURES):
-            fitted = joint(start, training_data, LATER).model
-            fits.append(Fitted(fitted, score_model(fitted, training_data)))
+            fitted = joint(start, training_data, LATER)
+            fits.append(scored(fitted.model, training_data, fitted.linearised))
     return min(fits, key=BY_COST, default=None)
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`bounded_step`: the minimum of a small quadratic function inside bounds, and the bounds of the steps of a fit."""
+"""`bounded_step`: the minimum of a small quadratic function inside bounds; bounds and directions of steps of a fit."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ...effects import Arx
 from ...model.model import Model
 
 Array = NDArray[np.float64]
@@ -85,3 +86,23 @@ def _room(limits: Array, theta: Array, directions: Array, open_end: float) -> Ar
         if moved.size == 1:
             far[j] = limits[moved[0]] - theta[moved[0]]
     return far
+
+
+def gauge(model: Model, names: Sequence[str]) -> Array:
+    """Directions (q, r) in which the free parameters may change at constant G(1).
+
+    If w is scaled by c, the gains of the hysteresis scale by c and b by 1/c, so one direction is not determined. If all
+    of `b` is free, b1 follows from G(1) = B(1)/A(1).
+    """
+    directions = np.eye(len(names))
+    if Arx.name not in model or not model.has_hysteresis:
+        return directions
+    b = [i for i, n in enumerate(names) if n.startswith(f"{Arx.name}.b[")]
+    gains = {f"{model.hysteresis.name}.{n}" for n in model.hysteresis.linear_numbers()}
+    if len(b) < len(model.effect(Arx).array("b")) or not gains.issubset(names):
+        return directions
+    directions[b[0], b[1:]] = -1.0
+    for i, n in enumerate(names):
+        if n.startswith(f"{Arx.name}.a["):
+            directions[b[0], i] = model.effect(Arx).dc_gain
+    return np.delete(directions, b[0], axis=1)

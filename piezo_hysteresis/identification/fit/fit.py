@@ -22,22 +22,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects import Arx
 from ...errors import DivergenceError, IdentificationError, ParameterError
 from ...model.model import Model
 from ...model.parameter_covariance import ParameterCovariance
 from ...record import Record
-from .bounded_step import bounds_of, room_of
+from .bounded_step import bounds_of, gauge, room_of
 from .covariance import covariance
-from .normal_equations import Gram, Nuisance, grams, residuals
+from .normal_equations import Gram, Linearised, Nuisance, grams, residuals
 from .stable_step import stable_step
 from .time_limit import check_time
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
-TRUSTED = 1.0
-"""Largest damping at which a small decrease of the cost means convergence."""
+TRUSTED, STALLED = 1.0, 3
+"""Largest damping at which one small decrease of the cost means convergence; number of them in a row that do at any."""
 MAX_DAMPING = 1e10
 """Damping at which a fit ends: no step lowers the cost. It has converged, unless even the smallest step diverges."""
 
@@ -66,6 +65,8 @@ class Fit:
         False if the iteration limit was reached first.
     iterations : int
         Number of linearisations.
+    linearised : Linearised, optional
+        The model linearised at the fitted values; None if the fit did not end with a linearisation.
     """
 
     model: Model
@@ -77,6 +78,7 @@ class Fit:
     at_bounds: tuple[str, ...]
     converged: bool
     iterations: int
+    linearised: Linearised | None = None
 
     @property
     def stated_model(self) -> Model:
@@ -108,26 +110,6 @@ class Fit:
         return float(self.covariance[i, j] / scale) if scale > 0.0 else 0.0
 
 
-def gauge(model: Model, names: Sequence[str]) -> Array:
-    """Directions (q, r) in which the free parameters may change at constant G(1).
-
-    If w is scaled by c, the gains of the hysteresis scale by c and b by 1/c, so one direction is not determined. If all
-    of `b` is free, b1 follows from G(1) = B(1)/A(1).
-    """
-    directions = np.eye(len(names))
-    if Arx.name not in model or not model.has_hysteresis:
-        return directions
-    b = [i for i, n in enumerate(names) if n.startswith(f"{Arx.name}.b[")]
-    gains = {f"{model.hysteresis.name}.{n}" for n in model.hysteresis.linear_numbers()}
-    if len(b) < len(model.effect(Arx).array("b")) or not gains.issubset(names):
-        return directions
-    directions[b[0], b[1:]] = -1.0
-    for i, n in enumerate(names):
-        if n.startswith(f"{Arx.name}.a["):
-            directions[b[0], i] = model.effect(Arx).dc_gain
-    return np.delete(directions, b[0], axis=1)
-
-
 def weighted(grams_: Sequence[Gram], floors: Array) -> Array:
     """Mean over the records of Gram/(size·floor²): every record has the same weight.
 
@@ -147,6 +129,7 @@ def fit(
     max_iterations: int = 40,
     tolerance: float = 1e-6,
     damping: float = 1e-3,
+    known: Linearised | None = None,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit the parameters `free` of `model` to the free-run displacement of `records`.
@@ -172,6 +155,8 @@ def fit(
         Relative decrease of the cost at convergence.
     damping : float
         Damping of the first step, as a share of the diagonal; a start near the solution needs little.
+    known : Linearised, optional
+        `model` linearised at its values on these records, if it is known; used if it is by the parameters `free`.
     progress : callable, optional
         Called with a message and the fraction done.
 
@@ -191,10 +176,10 @@ def fit(
     directions = gauge(model, free)
 
     try:
-        current = grams(model, records, free, nuisance)
+        current = known.grams if known and known.names == free else grams(model, records, free, nuisance)
     except DivergenceError as error:
         raise IdentificationError(f"fit: the start values diverge ({error})") from error
-    iterations, converged = 1, False
+    iterations, small, converged = 1, 0, False
     total = weighted(current, sizes)
     while iterations < max_iterations and not converged:
         hessian = directions.T @ total[:-1, :-1] @ directions
@@ -225,7 +210,8 @@ def fit(
         damping = max(damping / 10.0, 1e-12)
         total = weighted(current, sizes)
         iterations += 1
-        converged = decrease < tolerance and damping < TRUSTED  # a strongly damped step does not show convergence
+        small = small + 1 if decrease < tolerance else 0
+        converged = small > 0 and (damping < TRUSTED or small >= STALLED)  # one strongly damped step does not show it
         if progress is not None:
             progress("joint fit", iterations / max_iterations)
     return Fit(
@@ -238,6 +224,7 @@ def fit(
         at_bounds=tuple(n for n, v, a, b in zip(free, theta, lower, upper, strict=True) if v in (a, b)),
         converged=converged,
         iterations=iterations,
+        linearised=Linearised(free, current),
     )
 
 

@@ -30,8 +30,9 @@ from numpy.typing import NDArray
 
 from ...effects.effect import ChainPosition
 from ...record import Record
+from .bounded_step import gauge
 from .covariance import sandwich
-from .fit import Fit, gauge
+from .fit import Fit
 from .normal_equations import Nuisance, grams
 
 Array = NDArray[np.float64]

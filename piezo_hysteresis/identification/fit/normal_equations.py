@@ -100,6 +100,22 @@ class Gram:
         return float(np.sqrt(max(self.matrix[-1, -1], 0.0) / self.size))
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Linearised:
+    """A model linearised at its values.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Parameters of the sensitivities.
+    grams : sequence of Gram
+        Inner products of every record.
+    """
+
+    names: tuple[str, ...]
+    grams: Sequence[Gram]
+
+
 def grams(
     model: Model,
     records: Sequence[Record],

@@ -26,8 +26,7 @@ from numpy.typing import NDArray
 from ...effects import Arx
 from ...errors import DivergenceError, ParameterError
 from ...model.model import Model
-from ..fit.bounded_step import bounded_step, bounds_of
-from ..fit.fit import gauge
+from ..fit.bounded_step import bounded_step, bounds_of, gauge
 from ..fit.normal_equations import grams
 from ..fit.time_limit import check_time
 from .pieces import WEIGHTS, RecordPiece

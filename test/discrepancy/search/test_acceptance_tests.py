@@ -29,6 +29,7 @@ from piezo_hysteresis.effects import AmplifierSaturation, BoucWen, Creep, CreepF
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
+from piezo_hysteresis.identification.fit.normal_equations import Linearised
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
@@ -67,7 +68,7 @@ def scored(*ratios):
 )
 def test_an_effect_must_gain_also_over_the_model_that_was_refitted_without_it(monkeypatch, before, alone, reason):
     drift = fitted(GainDrift(g=0.05, tau=600.0), ("gain_drift.g", "gain_drift.tau"), np.eye(2), null=0.5)
-    refitted = alone and Fitted(drift.fit.model, scored(*alone))
+    refitted = alone and Fitted(drift.fit.model, scored(*alone), Linearised((), ()))
     monkeypatch.setattr(acceptance_tests, "without", lambda candidate: refitted)
     rejection = first_rejection(replace(drift, score=scored(1.0, 1.0)), scored(*before))
     assert rejection is None if reason is None else (rejection.name == "gain_drift" and reason in rejection.reason)

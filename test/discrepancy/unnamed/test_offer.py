@@ -91,7 +91,7 @@ def setup_of(plant: Model) -> BaselineSetup:
     span = float(np.ptp([r.displacement.max() for r in records] + [0.0]))
     data = TrainingData(records[:9], least[:9], Extent.of(records, PLAIN.voltage_scale, PLAIN.displacement_scale))
     fit = joint(PLAIN, data, LAST)
-    data, score = score_baseline(fit.model, data)
+    data, score = score_baseline(fit, data)
     lost = [np.zeros(r.size) for r in records]
     return BaselineSetup(
         records, records, lost, least, least, span, range(len(records)), chosen, (9, 10), data, fit, score
