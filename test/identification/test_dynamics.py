@@ -22,7 +22,7 @@ from benchmarks.published_plant import A_Z, B_Z, DELAY, SAMPLE_PERIOD, STROKE, h
 from piezo_hysteresis.effects import Arx
 from piezo_hysteresis.errors import IdentificationError
 from piezo_hysteresis.identification.protocol import protocol
-from piezo_hysteresis.identification.steps.dynamics import Dynamics, identify_arx
+from piezo_hysteresis.identification.steps.dynamics import Dynamics, best_arx, identify_arx
 from piezo_hysteresis.identification.steps.frequency_response import periodic, welch
 from piezo_hysteresis.identification.steps.linear_start import ITERATIONS
 from piezo_hysteresis.identification.steps.order_choice import choose_order, compare_orders
@@ -92,6 +92,13 @@ def test_iterations_find_weak_and_lightly_damped_modes_last(seed):
 def poles(frequency, damping):
     pole = np.exp(2 * np.pi * frequency * SAMPLE_PERIOD * (-damping + 1j * np.sqrt(1 - damping**2)))
     return np.real(np.poly([pole, np.conj(pole)]))
+
+
+def test_few_and_many_iterations_in_one_run_give_the_models_of_two_runs():
+    few, many = best_arx(noisy(2e-3), DELAY, SAMPLE_PERIOD, (2, 3), (0, ITERATIONS))
+    for model, iterations in ((few, 0), (many, ITERATIONS)):
+        assert model.arx == identify_arx(noisy(2e-3), DELAY, SAMPLE_PERIOD, (2, 3), iterations).arx
+    assert len(best_arx([(W, Y)], DELAY, SAMPLE_PERIOD, (8, 8), (0, 0))) == 1
 
 
 def test_a_noisy_record_gives_a_start_good_to_0_3_percent():

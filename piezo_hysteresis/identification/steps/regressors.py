@@ -70,7 +70,7 @@ def triangle(signals: Signals, orders: tuple[int, int], delay: int) -> Array:
     rows = np.zeros((size + BLOCK, size), order="F")  # the factor so far, and a block below it
     for u, y in signals:
         end = y.size
-        columns = [-y[first - k : end - k] for k in range(1, na + 1)]
+        columns = [y[first - k : end - k] for k in range(1, na + 1)]
         columns += [u[first - delay - k : end - delay - k] for k in range(nb)]
         columns.append(y[first:])
         means = [column.mean() for column in columns]
@@ -78,6 +78,7 @@ def triangle(signals: Signals, orders: tuple[int, int], delay: int) -> Array:
             count = min(BLOCK, end - first - start)
             for k, (column, mean) in enumerate(zip(columns, means, strict=True)):
                 np.subtract(column[start : start + count], mean, out=rows[size : size + count, k])
+            rows[size : size + count, :na] *= -1.0
             factor = lapack.dgeqrf(rows[: size + count])[0]
             rows[:size] = np.triu(factor[:size])
     return np.ascontiguousarray(rows[:size])
