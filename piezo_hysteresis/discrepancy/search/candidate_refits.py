@@ -19,16 +19,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
 
 from ...effects.effect import ChainPosition
-from ...identification.cores import on_cores
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Progress
 from ...identification.records.noise_floor import ADEQUATE
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate
-from .refit import FIRST, LAG, LATER, from_all_starts, proceed, refit, restart
+from .refit import FIRST, LAG, LATER, collected, from_all_starts, proceed, refit, restart
 
 LEAST_GAIN = 0.15
 """Smallest gain in mean ln max(1, R²) for which an effect is accepted."""
@@ -41,7 +39,6 @@ WORTHWHILE = 0.8
 TIE = 0.02
 """Difference in gain up to which the form and the effect with the fewest parameters are taken."""
 
-AnyCandidate = TypeVar("AnyCandidate", bound=Candidate)
 Fitter = Callable[[Candidate], FittedCandidate | None]
 """Fits a candidate; None if this diverges."""
 
@@ -57,27 +54,17 @@ def refit_candidates(
     """Joint refits, best first: few linearisations for all, then new dynamics, then convergence for the best ones."""
     progress("refits of the candidates", 0.2)
     first = partial(refit, model, max_iterations=FIRST)
-    refits = _collected(first, candidates, lambda c, found: not any(_is_far_behind(c, r, before) for r in found))
+    refits = collected(first, candidates, lambda c, found: not any(_is_far_behind(c, r, before) for r in found))
     refits.sort(key=BY_COST)
     progress("new estimate of the dynamics", 0.6)
-    anew = _collected(_anew, refits[:AGAIN], lambda c, found: not found or _is_close(c, found[0], before))
+
+    def is_rival(candidate: FittedCandidate, found: Sequence[FittedCandidate]) -> bool:
+        return not found or _is_close(candidate, found[0], before)
+
+    anew = collected(_anew, refits[:AGAIN], is_rival)
     field = _replaced(refits, anew)
     progress("refits of the best candidates", 0.8)
-    last = partial(settled, before=before)
-    return _replaced(field, _collected(last, field, lambda c, found: not found or _is_close(c, found[0], before)))
-
-
-def _collected(
-    fit: Callable[[AnyCandidate], FittedCandidate | None],
-    candidates: Sequence[AnyCandidate],
-    wanted: Callable[[AnyCandidate, list[FittedCandidate]], bool] = lambda candidate, found: True,
-) -> list[FittedCandidate]:
-    """Fits of the candidates that are wanted beside those found before, without the fits that diverged."""
-    found = list[FittedCandidate]()
-    for _, result in on_cores(fit, candidates, lambda candidate: wanted(candidate, found)):
-        if result is not None:
-            found.append(result)
-    return found
+    return _replaced(field, collected(partial(settled, before=before), field, is_rival))
 
 
 def _replaced(before: list[FittedCandidate], after: list[FittedCandidate]) -> list[FittedCandidate]:
@@ -93,7 +80,7 @@ def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], be
     """
     is_far = before.excess > ADEQUATE
     bending = [c for c in candidates if _bends_dynamics(c) and (is_far or c.effect.family == LAG)]
-    return _collected(partial(_settled, partial(from_all_starts, model), before), bending)
+    return collected(partial(_settled, partial(from_all_starts, model), before), bending)
 
 
 def _settled(fit: Fitter, before: Score, candidate: Candidate) -> FittedCandidate | None:
@@ -114,7 +101,7 @@ def refits_of_twins(candidates: Sequence[Candidate], best: FittedCandidate, befo
     """
     twins = [c for c in candidates if c.effect.is_twin_of(best.effect)]
     from_best = partial(refit, best.fit.model.without(best.name), max_iterations=LATER)
-    return _collected(partial(_settled, from_best, before), twins)
+    return collected(partial(_settled, from_best, before), twins)
 
 
 def _anew(candidate: FittedCandidate) -> FittedCandidate:

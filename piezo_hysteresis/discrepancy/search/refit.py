@@ -20,10 +20,11 @@ effect over a refit without it that had the same number of iterations.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial, reduce
+from typing import TypeVar
 
 from ...errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ...identification.cores import on_cores
@@ -38,6 +39,9 @@ from ...identification.steps.modes import identify_modes
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate, adjusted_numbers, linearised, score_model
 from .training_data import TrainingData
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 LAG = "lag"
 """Family of the effects that delay the motion."""
@@ -93,6 +97,19 @@ def scored(model: Model, training_data: TrainingData, known: Linearised | None =
     return Fitted(model, score_model(model, training_data, at), at)
 
 
+def collected(
+    fit: Callable[[Item], Result | None],
+    items: Sequence[Item],
+    wanted: Callable[[Item, Sequence[Result]], bool] = lambda item, found: True,
+) -> list[Result]:
+    """Fits of the items that are wanted beside those found before, without the fits that diverged."""
+    found = list[Result]()
+    for _, result in on_cores(fit, items, lambda item: wanted(item, found)):
+        if result is not None:
+            found.append(result)
+    return found
+
+
 def refit(model: Model, candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
     """Fit the model with the candidate jointly, from its start values; None if this diverges."""
     return _refitted(model.with_effect(candidate.effect), candidate, max_iterations)
@@ -125,11 +142,8 @@ def restart(candidate: FittedCandidate, max_iterations: int) -> FittedCandidate:
     models = [candidate.fit.model]
     if (first := candidate.training_data.start) is not None:
         models.append(reduce(Model.with_effect, [e for e in models[0].effects if e.name not in first], first))
-    found = list[Fitted]()
     behind = partial(_behind_anew, training_data=candidate.training_data)
-    for _, fitted in on_cores(behind, models, lambda model: all(f.score.excess > ADEQUATE for f in found)):
-        if fitted is not None:
-            found.append(fitted)
+    found = collected(behind, models, lambda model, found: all(f.score.excess > ADEQUATE for f in found))
     anew = _from_best(found, candidate, max_iterations)
     return candidate if anew is None or anew.fit.cost >= candidate.fit.cost else anew
 
