@@ -182,9 +182,8 @@ class DriverSession:
         s, period = self.settings, self.stage.sample_period
         if not (BACK_ENDS[s.stage].has_keeper and s.keeper_timeout):
             return None
-        return KeeperLink(
-            s.stage, self._values, period, self.limits, s.ramp_rate, s.keeper_timeout, self._longest_step()
-        )
+        times, locks = (s.keeper_timeout, self._longest_step()), self._lock.descriptors
+        return KeeperLink(s.stage, self._values, period, self.limits, s.ramp_rate, *times, locks)
 
     def _longest_step(self) -> float:
         """Time within which a working stage reaches its safe voltage and answers every call [s]."""

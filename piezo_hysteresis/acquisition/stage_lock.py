@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`StageLock`: allows one driver per stage on a computer; the lock ends with its process. No ROS."""
+"""`StageLock`: allows one driver per stage on a computer; it ends with its process and the keeper of this. No ROS."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ import fcntl
 import hashlib
 import os
 import stat
+import time
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -29,6 +30,10 @@ from ..errors import StageError
 
 FOLDERS = (Path("/run/lock"), Path("/tmp"))
 """Possible folders for locks; the first one in which every user may write is used."""
+
+
+KEEPER_TIME = 10.0
+"""Longest wait for the keeper of a driver that has ended [s]."""
 
 
 class StageLock:
@@ -58,8 +63,13 @@ class StageLock:
         """Add a lock; raises StageError if another process holds it."""
         self._files.append(_lock(what))
 
+    @property
+    def descriptors(self) -> list[int]:
+        """File descriptors of all locks; a process that inherits them holds the locks, too."""
+        return [file.fileno() for file in self._files]
+
     def release(self) -> None:
-        """Release all locks; may be repeated."""
+        """Release all locks; may be repeated. A keeper that moves the stage still holds its own."""
         for file in self._files:
             file.close()
         self._files.clear()
@@ -89,6 +99,19 @@ def _opened(path: Path) -> int:
     return descriptor
 
 
+def _taken(file: TextIO) -> bool:
+    """Take the lock on a file; False if another process holds it."""
+    with suppress(OSError):
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return True
+    return False
+
+
+def _has_ended(process: str) -> bool:
+    """Whether a process has ended that is given by its number; then its keeper still holds the lock."""
+    return process.isdecimal() and not Path(f"/proc/{process}").exists()
+
+
 def _lock(what: str) -> TextIO:
     path = _folder() / f"piezo_hysteresis_{hashlib.sha256(what.encode()).hexdigest()[:16]}.lock"
     try:
@@ -97,15 +120,21 @@ def _lock(what: str) -> TextIO:
         raise StageError(
             f"{what}: cannot make the lock {path} ({error.strerror}); expected a writable folder"
         ) from None
-    file = os.fdopen(descriptor, "r+", encoding="utf-8")
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
+    file = os.fdopen(descriptor, "r+", encoding="utf-8", errors="replace")
+    end = time.monotonic() + KEEPER_TIME
+    while not _taken(file):
+        file.seek(0)
         holder = file.read(20).strip() or "unknown"
+        if _has_ended(holder) and time.monotonic() < end:
+            time.sleep(0.05)
+            continue
         file.close()
         raise StageError(
-            f"{what} is held by process {holder} already; end that one or take another namespace"
-        ) from None
+            f"{what}: process {holder} has ended, but its keeper still brings the stage to its safe voltage; try again"
+            if _has_ended(holder)
+            else f"{what} is held by process {holder} already; end that one or take another namespace"
+        )
+    file.seek(0)
     file.truncate(0)
     file.write(f"{os.getpid()}\n")
     file.flush()

@@ -167,16 +167,17 @@ class Description:
         if not inside.all():
             first = int(np.argmin(inside))
             raise StageError(
-                f"{self.name}: drive sample {first} is {block[first]:g} V, expected {self.voltage_min:g} to "
+                f"{self.name}: drive sample {first} is {block[first]:.9g} V, expected {self.voltage_min:g} to "
                 f"{self.voltage_max:g} V; nothing was played"
             )
         if math.isfinite(self.max_slew_rate):
             steepest = self.max_slew_rate * sample_period
             step = np.abs(np.diff(block, prepend=present_voltage))
-            if step.max() > steepest * (1 + 1e-9) + 1e-12:
-                first = int(np.argmax(step > steepest))
+            too_steep = step > steepest * (1 + 1e-9) + 1e-12
+            if too_steep.any():
+                first = int(np.argmax(too_steep))
                 raise StageError(
-                    f"{self.name}: drive sample {first} steps by {step[first]:g} V, expected at most {steepest:g} V "
+                    f"{self.name}: drive sample {first} steps by {step[first]:.9g} V, expected at most {steepest:g} V "
                     f"per sample ({slew_text(self.max_slew_rate)}); nothing was played"
                 )
         return block

@@ -26,7 +26,8 @@ from subprocess import PIPE
 import numpy as np
 import pytest
 
-from benchmarks.wire import PERIOD, RAMP, SAFE_WITHIN, SLEW, TOP, check_wire, device, driver_process
+from benchmarks.wire import PERIOD, RAMP, SAFE_WITHIN, SLEW, TOP, check_wire, device, driver_process, settings
+from piezo_hysteresis.acquisition.session import DriverSession
 from piezo_hysteresis.stage.back_ends import BACK_ENDS
 from piezo_hysteresis.stage.opening import Opening
 
@@ -76,6 +77,35 @@ def test_a_driver_that_is_killed_or_stopped_in_motion(tmp_path, word, number):
             process.send_signal(signal.SIGCONT)
             assert process.wait(30.0) != 0
             assert abs(amplifier.output) <= SAFE_WITHIN, "what was stopped moves nothing when it goes on"
+
+
+SLOW = {"keeper_timeout": TIMEOUT, "ramp_rate": 5.0, "voltage_max": TOP}
+"""Settings of a driver whose keeper needs a second to the safe voltage."""
+AT_THREE_VOLTS = """
+import json, sys, time
+from benchmarks.wire import DriverSession, settings
+word, parameters, changes = json.loads(sys.argv[1])
+session = DriverSession(settings(word, **changes), parameters, "place")
+session.start(time.time_ns, lambda block: None, print, lambda: 1).ramp_to(3.0)
+time.sleep(100.0)
+"""
+
+
+def test_a_new_driver_waits_until_the_keeper_of_a_killed_one_has_ended():
+    """It opened the stage while the keeper moved it, and its stream began with a step of 3 V."""
+    pytest.importorskip("nidaqmx")
+    with device("nidaqmx") as (name, parameters, amplifier, _):
+        order = json.dumps([name, parameters, SLOW])
+        with subprocess.Popen([sys.executable, "-c", AT_THREE_VOLTS, order]) as process:
+            while amplifier.output < 2.9:
+                time.sleep(0.01)
+            process.kill()
+        session = DriverSession(settings(name, **SLOW), parameters, "place")
+        assert session.stage.voltage == 0.0
+        session.start(time.time_ns, lambda block: None, print, lambda: 1)
+        time.sleep(0.2)
+        session.close()
+        check_wire(amplifier.wire)
 
 
 def test_a_driver_that_goes_on_while_its_keeper_acts_leaves_the_stage_alone(tmp_path):

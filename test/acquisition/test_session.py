@@ -14,13 +14,14 @@
 
 """A session that is interrupted or fails leaves no stage energised; one that is refused moves no stage."""
 
+import re
 import threading
 import time
 
 import numpy as np
 import pytest
 
-from benchmarks.wire import LSB, SAFE_WITHIN, WiredSession, check_wire, device, settings, values
+from benchmarks.wire import LSB, PERIOD, RAMP, SAFE_WITHIN, WiredSession, check_wire, device, settings, values
 from piezo_hysteresis.acquisition.session import DriverSession
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.record import Record
@@ -107,6 +108,36 @@ def test_a_device_with_a_buffer_is_reported_safe_when_its_output_is_and_starts_a
         assert not s.failures
         s.end()
         check_wire(s.wire)
+
+
+def test_a_stage_that_another_program_moves_before_the_stream_is_not_stepped_back():
+    """The first sample was the voltage at which the stage had been opened."""
+    with device("nidaqmx") as (name, parameters, amplifier, (card, _)):
+        s = WiredSession(name, parameters, amplifier)
+        card.set(4.0)
+        begin = amplifier.wire.size
+        s.start()
+        s.wait(lambda: s.failures, "the refusal")
+        assert re.search(r"output is at \S+ V, expected 0 V.*safe voltage, 0 V", str(s.failures[0]))
+        s.end()
+        steps = np.diff(amplifier.wire[begin:])
+        assert np.abs(steps).max() <= RAMP * PERIOD + 2 * LSB
+        assert abs(amplifier.output) <= SAFE_WITHIN
+
+
+def test_a_card_left_outside_the_limits_is_ramped_from_where_it_is():
+    """It was taken for one at the limit, and went there in one step."""
+    with device("nidaqmx") as (name, parameters, amplifier, (card, _)):
+        card.set(9.0)
+        begin = amplifier.wire.size
+        s = WiredSession(name, parameters | {"voltage_max": 5.0}, amplifier, voltage_max=5.0)
+        (notice,) = s.session.notices
+        assert re.search(r"found at (9|8\.99\d+) V, outside 0 to 5 V", notice)
+        s.start()
+        s.wait(lambda: s.deliveries, "the stream")
+        s.end()
+        assert np.abs(np.diff(amplifier.wire[begin:])).max() <= RAMP * PERIOD + 2 * LSB
+        assert abs(amplifier.output) <= SAFE_WITHIN
 
 
 @pytest.mark.parametrize("kept", [True, False])

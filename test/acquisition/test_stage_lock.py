@@ -17,6 +17,7 @@
 import os
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -63,6 +64,33 @@ def test_a_killed_process_releases_its_lock(tmp_path):
         holder.kill()
         holder.wait()
         StageLock(["device A"]).release()
+
+
+def test_a_process_that_inherits_a_lock_holds_it_until_it_ends(tmp_path):
+    """The keeper of a driver that was killed still moves the stage."""
+    inherits = HOLDER.replace(
+        "sys.stdin.read()",
+        "import subprocess\nsubprocess.Popen(['sleep', '1.5'], pass_fds=lock.descriptors)\nsys.stdin.read()",
+    )
+    holder = subprocess.Popen(
+        [sys.executable, "-c", inherits, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    with holder:
+        assert holder.stdout.readline() == b"held\n"
+        time.sleep(0.2)
+        holder.kill()
+    begin = time.monotonic()
+    StageLock(["device A"]).release()
+    assert time.monotonic() - begin > 0.3, "it waits for the process that is left"
+
+
+def test_a_damaged_lock_is_refused_in_one_line(tmp_path):
+    first = StageLock(["device A"])
+    (path,) = tmp_path.glob("*.lock")
+    path.write_bytes(b"\xff\xfe")
+    with pytest.raises(StageError, match="device A is held by process"):
+        StageLock(["device A"])
+    first.release()
 
 
 def test_the_folder_does_not_depend_on_the_environment(tmp_path, monkeypatch):

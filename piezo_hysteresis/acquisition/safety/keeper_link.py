@@ -24,7 +24,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import IO, Any, cast
 
@@ -69,6 +69,9 @@ class KeeperLink:
         Time without a heartbeat after which the keeper acts [s].
     patience : float
         Longest duration of a step of the acquisition [s]; after this time the heartbeats end.
+    locks : sequence of int
+        Descriptors of the locks on the stage, which the keeper holds to its own end: while it moves the stage, no new
+        driver may open it.
 
     Raises
     ------
@@ -85,6 +88,7 @@ class KeeperLink:
         ramp_rate: float,
         timeout: float,
         patience: float,
+        locks: Sequence[int] = (),
     ) -> None:
         order = {
             "stage": word,
@@ -103,6 +107,7 @@ class KeeperLink:
             [sys.executable, "-m", "piezo_hysteresis.acquisition.safety.keeper"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            pass_fds=locks,
             start_new_session=True,  # a signal to the driver's process group must not end its keeper
         )
         # Popen types its pipes as optional; with PIPE both exist

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from ..fault import FaultCatalogue
 
-_IN_A_STREAM = "ReadAnalogF64:4"
-"""Call at which a fault begins by default: the third block of a stream."""
+_IN_A_STREAM = "ReadAnalogF64:5"
+"""Call at which a fault begins by default: the second block of a stream, of a card that reads its output back."""
 
 FAULTS = FaultCatalogue(
     once={

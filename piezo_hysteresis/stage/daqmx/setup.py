@@ -139,7 +139,7 @@ class DaqmxSetup:
             voltage_min=s.voltage_min,
             voltage_max=s.voltage_max,
             max_slew_rate=s.max_slew_rate,
-            safe_voltage=min(max(s.safe_voltage, s.voltage_min), s.voltage_max),
+            safe_voltage=s.safe_voltage,
             amplifier_gain=s.amplifier_gain,
             displacement_min=-scale,
             displacement_max=scale,

@@ -63,7 +63,8 @@ class DaqmxStage:
         self._readings: Samples = np.empty(0)
         self._agreement = self._new_agreement()
         try:
-            found = self._found(self._tasks.read_once())
+            self._tasks.read_once()  # a missing input is reported before anything moves
+            found = self._found()
             self._is_blind = found is None
             if found is None and not setup.assume_safe:
                 raise UnknownVoltageError(
@@ -119,6 +120,7 @@ class DaqmxStage:
         goal = self._limiter.goal(voltage)
         with self._guarded():
             self._drain()
+            self._require_unmoved()
             self._go(goal)
 
     def read_displacement(self) -> float:
@@ -164,6 +166,7 @@ class DaqmxStage:
 
     def _stream(self, drive: Samples) -> Acquired:
         if not self._tasks.is_running:
+            self._require_unmoved()
             delayed = self._lead + round(self._setup.io_delay / self._sample_period)
             self._waiting = np.full(delayed, self._voltage)
             self._tasks.start(self._sample_period, np.full(self._lead, self._voltage))
@@ -185,18 +188,34 @@ class DaqmxStage:
         """Drive voltage from the monitor [V]."""
         return np.asarray(readings[1] / (self._setup.monitor_gain * self._setup.amplifier_gain))
 
-    def _found(self, readings: Samples) -> float | None:
+    def _found(self) -> float | None:
         """Drive voltage at which the output stands [V]; None if neither card nor monitor reports it."""
         found, uncertainty = self._tasks.output(), _READ_BACK_ERROR
         if found is None:
             if not self._setup.voltage_input:
                 return None
-            found = float(self._measured(readings).ravel()[0])
+            found = float(self._measured(self._tasks.read_once()).ravel()[0])
             uncertainty = self._setup.voltage_tolerance / abs(self._setup.amplifier_gain)
-        safe = self._description.safe_voltage
-        if abs(found - safe) <= uncertainty:
-            return safe
-        return min(max(found, self._description.voltage_min), self._description.voltage_max)
+        d = self._description
+        known = (d.safe_voltage, min(max(found, d.voltage_min), d.voltage_max))
+        near = next((voltage for voltage in known if abs(found - voltage) <= uncertainty), found)
+        self._tasks.include(near)
+        return near
+
+    def _require_unmoved(self) -> None:
+        """DaqmxError if another program has moved the output, from where a first sample would be a step."""
+        found = self._found()
+        if found is not None and abs(found - self._voltage) > self._tolerance:
+            raise DaqmxError(
+                f"{self._description.name}: the output is at {found:g} V, expected {self._voltage:g} V, where this "
+                "driver left it; end the other program that moves it"
+            )
+
+    @property
+    def _tolerance(self) -> float:
+        """Largest error of the voltage that is found at the output [V]."""
+        s = self._setup
+        return max(_READ_BACK_ERROR, s.voltage_tolerance / abs(s.amplifier_gain) if s.voltage_input else 0.0)
 
     def _new_agreement(self) -> Agreement:
         s, d = self._setup, self._description
@@ -226,18 +245,24 @@ class DaqmxStage:
                 self._drain()
             except DeviceError:
                 self._abort()
-        elif self._voltage != self._description.safe_voltage:
-            self._go(self._description.safe_voltage)
+        else:
+            self._voltage = self._here()
+            if self._voltage != self._description.safe_voltage:
+                self._go(self._description.safe_voltage)
 
     def _abort(self) -> None:
         """End a stream that has failed, and go to the safe voltage from where the output stands, if that is certain."""
         self._tasks.abandon(runs_dry=self._is_blind)
-        reported = self._found(self._tasks.read_once())
+        self._voltage = self._here()
+        self._go(self._description.safe_voltage)
+
+    def _here(self) -> float:
+        """Where the output stands [V]; no stream is running."""
+        reported = self._found()
         found = self._tasks.last_written if reported is None else reported
         if found is None:
             raise DaqmxError(f"{self._description.name}: neither the card nor a monitor reports the output")
-        self._voltage = found
-        self._go(self._description.safe_voltage)
+        return found
 
     def _go(self, goal: float) -> None:
         """Go to a voltage [V] by the ramp of the limiter, on the clock of the card; no stream is running."""

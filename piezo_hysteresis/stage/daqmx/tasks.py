@@ -75,12 +75,17 @@ class Tasks:
         self._reader: Any = None
         self._sample_period, self._queued = setup.sample_period, 0.0  # the latter: duration of the output in the buffer
         self.last_written: float | None = None
+        self._lowest, self._highest = setup.voltage_min, setup.voltage_max
         self._connect()
 
     @property
     def is_running(self) -> bool:
         """True while output and input stream."""
         return self._output is not None
+
+    def include(self, voltage: float) -> None:
+        """Let outputs begin at a voltage [V] at which another program has left the card, outside the limits."""
+        self._lowest, self._highest = min(self._lowest, voltage), max(self._highest, voltage)
 
     def start(self, sample_period: float, first: Samples) -> None:
         """Stream from now on: output without regeneration, beginning with `first`; input on the output's clock."""
@@ -225,7 +230,7 @@ class Tasks:
 
     def _output_task(self) -> Any:
         s, task = self._setup, self._task()
-        task.ao_channels.add_ao_voltage_chan(f"{s.device}/{s.output}", min_val=s.voltage_min, max_val=s.voltage_max)
+        task.ao_channels.add_ao_voltage_chan(f"{s.device}/{s.output}", min_val=self._lowest, max_val=self._highest)
         return task
 
     def _input_task(self) -> Any:

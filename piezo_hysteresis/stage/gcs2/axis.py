@@ -97,7 +97,7 @@ class Axis:
             voltage_min=low,
             voltage_max=high,
             max_slew_rate=s.max_slew_rate,
-            safe_voltage=min(max(s.safe_voltage, low), high),
+            safe_voltage=s.safe_voltage,
             longest_block=self._longest_block("WMS?" in known),
             amplifier_gain=s.amplifier_gain,
             measured_voltage=True,
@@ -116,9 +116,9 @@ class Axis:
             played = s.longest_wave or recorded
         else:
             played = client.whole(f"WMS? {s.wave_table}")
-        if min(recorded, played) < 1:
+        if min(recorded, played) < 2:
             raise Gcs2Error(
-                f"{client.connection.place}: got {recorded} recorder and {played} wave points, expected some of each"
+                f"{client.connection.place}: got {recorded} recorder and {played} wave points, expected two of each"
             )
         return min(recorded, played)
 
@@ -176,8 +176,8 @@ class Axis:
             if left <= 0:
                 raise Gcs2Error(
                     f"{self.client.connection.place}: measured a drive of {measured:g} V, expected {drive:g} V within "
-                    f"{tolerance:g} V; the amplifier is saturated, or amplifier_gain, command_per_volt or "
-                    "command_at_zero is wrong"
+                    f"{tolerance:g} V; another program moves the stage, the amplifier is saturated, or amplifier_gain, "
+                    "command_per_volt or command_at_zero is wrong"
                 )
             time.sleep(min(left, 2e-3))
 

@@ -110,6 +110,7 @@ class Gcs2Stage:
         goal = self._limiter.goal(voltage)
         with self._guarded():
             self._axis.open_loop()
+            self._axis.require_voltage(self._voltage)
             self._go(goal)
 
     def read_voltage(self) -> float:
@@ -142,6 +143,7 @@ class Gcs2Stage:
         self._limiter.check(self._waveform, self._voltage, self._sample_period)
         with self._guarded():
             self._axis.open_loop()
+            self._axis.require_voltage(self._voltage)
             self._axis.arm(round(self._sample_period / self._axis.servo_time))
         self._forget()
         self._armed = True
@@ -245,7 +247,7 @@ class Gcs2Stage:
             if part.size > 1:
                 self._axis.follow(part)
             else:
-                self._axis.set_voltage(goal)
+                self._axis.set_voltage(float(part[-1]))
             self._voltage = float(part[-1])
         self._axis.require_voltage(goal)
 

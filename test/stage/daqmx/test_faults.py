@@ -33,7 +33,7 @@ BLOCKS = range(400, 4000, 400)
 STEPS = (
     "CreateTask:3 CreateAOVoltageChan:1 CreateAIVoltageChan:4 CfgSampClkTiming:1 CfgSampClkTiming:2 "
     "GetTimingAttributeDouble:1 SetWriteAttributeInt32:1 WriteAnalogF64:1 WriteAnalogF64:4 StartTask:1 StartTask:2 "
-    "ReadAnalogF64:3 ReadAnalogF64:5 ClearTask:3 ClearTask:4"
+    "ReadAnalogF64:3 ReadAnalogF64:4 ReadAnalogF64:6 ClearTask:3 ClearTask:4"
 )
 """Every kind of call between the first block and the last sample."""
 

@@ -138,3 +138,5 @@ def test_setups_and_cards_that_cannot_be(opened):
     for wrong in ({"device": ""}, {"lead": 0.0}, {"sensor_gain": 0.0}, {"io_delay": -1.0}, {"max_slew_rate": 0.0}):
         with pytest.raises(StageError, match="expected"):
             DaqmxSetup(**{"device": "Dev1", "max_slew_rate": 1e3, **wrong})
+    with pytest.raises(StageError, match="safe_voltage"):
+        opened(safe_voltage=8.0, voltage_max=5.0)

@@ -114,6 +114,36 @@ def test_a_drive_outside_a_limit_is_not_sent(bench):
     assert b.controller.heard == []
 
 
+@pytest.mark.parametrize("use", ["arm", "set_voltage"])
+def test_a_voltage_that_another_program_has_set_is_not_stepped_back(bench, use):
+    b = bench(max_slew_rate=1e5)
+    b.stage.restrict(b.stage.description, 1000.0)
+    b.stage.upload(np.zeros(100))
+    observer = b.observer()
+    observer.command("SVA 1 60")
+    b.controller.heard.clear()
+    with pytest.raises(
+        StageError, match=r"measured a drive of \S+ V, expected 0 V.*another program.*safe voltage, 0 V"
+    ):
+        b.stage.arm() if use == "arm" else b.stage.set_voltage(1.0)
+    assert b.voltage == pytest.approx(0.0, abs=1e-6)
+    first = next(line for line in b.controller.heard if line.startswith("WAV 1"))
+    offset, amplitude = (float(word) for word in first.split()[5:7])
+    assert offset + amplitude == pytest.approx(60.0, abs=0.01), "the way down begins where the stage was"
+    observer.connection.close()
+
+
+def test_a_controller_that_plays_single_points_only_is_refused(bench):
+    """Every point was a step to the goal."""
+    with pytest.raises(StageError, match="1 wave points, expected two of each"):
+        Gcs2Stage(bench(opened=False).setup(longest_wave=1))
+
+
+def test_a_safe_voltage_outside_the_limits_is_refused(bench):
+    with pytest.raises(StageError, match="safe_voltage"):
+        Gcs2Stage(bench(opened=False).setup(safe_voltage=-300.0))
+
+
 def test_out_of_order_is_refused(bench):
     stage = bench().stage
     for early in (stage.arm, stage.start, stage.read, lambda: stage.wait(0.0)):
