@@ -21,6 +21,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..effects import ChainPosition
+from ..effects.drive.amplifier_saturation import UNLIMITED
 from ..model.chain import ChainState
 from ..model.model import Model
 from ..model.samples import samples
@@ -52,7 +54,7 @@ def reachable(
     approximate: bool = False,
     search: bool = True,
 ) -> Reachability:
-    """Compare a path with and without the limits of the drive, from the model alone.
+    """Compare a path with and without the limits of the drive and of the amplifier, from the model alone.
 
     Parameters
     ----------
@@ -82,16 +84,29 @@ def reachable(
     state = start or settled_start(model, limits)
     limits = limits.resolved
     limited = Inverse(model, limits, band=band, approximate=approximate)
-    free = Inverse(model, Limits(resolution=limits.resolution), band=band, approximate=approximate)
+    ideal = without_amplifier_limits(model)
+    free = Inverse(ideal, Limits(resolution=limits.resolution), band=band, approximate=approximate)
     given, reached = _followed(limited, y, state)
     needed, aim = _followed(free, y, state)
     span = float(np.ptp(y)) or float(np.abs(y).max()) or model.displacement_scale
+    span = min(span, model.displacement_scale)  # what is too large is not allowed a larger error
     off = reached - aim
-    parts = _parts(off, needed, span, limits, model, limited.preview, aim)
+    parts = _parts(off, needed, span, limits, model, limited.preview, aim, ideal is not model)
     nearest = None
     if parts and search:
         nearest = nearest_path(model, limits, y, state, band=band, approximate=approximate)
     return Reachability(parts, nearest, reached, given)
+
+
+def without_amplifier_limits(model: Model) -> Model:
+    """The model with an amplifier that reaches every voltage at every slope; the model itself if it has such a one."""
+    limits = [
+        (f"{e.name}.{p.name}", p.off)
+        for e in model.effects
+        for p in e.parameters
+        if e.place is ChainPosition.DRIVE and p.off is not None and abs(p.off) >= UNLIMITED
+    ]
+    return model.with_values(dict(limits)) if limits else model
 
 
 def _followed(inverse: Inverse, y: Array, state: ChainState) -> tuple[Array, Array]:
@@ -102,7 +117,14 @@ def _followed(inverse: Inverse, y: Array, state: ChainState) -> tuple[Array, Arr
 
 
 def _parts(
-    off: Array, needed: Array, span: float, limits: Limits, model: Model, preview: int, aim: Array
+    off: Array,
+    needed: Array,
+    span: float,
+    limits: Limits,
+    model: Model,
+    preview: int,
+    aim: Array,
+    is_limited: bool,
 ) -> tuple[UnreachablePart, ...]:
     period = model.sample_period
     bad = np.flatnonzero(np.abs(off) > TOLERANCE * span)
@@ -124,6 +146,8 @@ def _parts(
             "max_slew_rate": (slew - limits.max_slew_rate) * period,
         }
         limit = max(beyond, key=lambda name: beyond[name])
+        if is_limited and beyond[limit] <= 0.0:
+            limit = "amplifier"
         worst = a + int(np.abs(off[a : b + 1]).argmax())
         found.append(
             UnreachablePart(

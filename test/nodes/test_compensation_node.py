@@ -28,7 +28,7 @@ from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.model_file import dumps, save
 from piezo_hysteresis.nodes.messages.cloud import to_cloud
-from piezo_hysteresis.nodes.messages.conversions import values_of
+from piezo_hysteresis.nodes.messages.conversions import command_to_cloud, values_of
 from piezo_hysteresis.nodes.runtime.qos import LATCHED, STATUS
 from piezo_hysteresis.stage.plant import PlantParameters
 
@@ -166,6 +166,26 @@ def test_a_hold_that_the_driver_ended_is_not_resumed(lab, end):
     lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")
     lab.pause(1.0)
     assert len(sent) == before and abs(node.samples.newest.voltage[-1]) < 1e-3
+
+
+def test_a_displacement_that_the_driver_refuses_is_not_said_to_be_held(lab):
+    """Another client's command was playing, and "set" stood for ever where nothing had moved."""
+    node = Compensation(lab, integral_time=0.3)
+    command = lab.publisher(PointCloud2, "command")
+    command.publish(command_to_cloud(np.zeros(20_000), PERIOD, "rest"))
+    lab.pause(0.5)
+    lab.publisher(Float64, "set_displacement").publish(Float64(data=0.4 * STROKE))
+    assert "the driver refused: set_voltage: 'rest' is being played" in node.until("set_displacement", "stopped").message
+
+
+@pytest.mark.parametrize("metres", [10.0, -1.0])
+def test_a_displacement_in_micrometres_is_refused(lab, metres):
+    """The tolerance of the check was a share of the path that was asked for, and the stage went to its limit."""
+    node = Compensation(lab)
+    lab.publisher(Float64, "set_displacement").publish(Float64(data=metres))
+    assert "not reachable" in node.until("set_displacement", "refused").message
+    lab.pause(0.3)
+    assert np.ptp(node.samples.voltage) < 1e-3
 
 
 def test_nothing_moves_while_play_is_false(lab):

@@ -87,6 +87,10 @@ class SetPoint:
             return
         why = driver.missing and f"no driver: waiting for {driver.missing}"
         why = why or driver.blocked
+        if self._has_arrived:
+            driver.refused_voltage = ""  # that of another client
+        elif driver.refused_voltage:
+            why = why or f"the driver refused: {driver.refused_voltage}"
         if not why and self.has_left(driver.distance(self._voltage), elapsed):
             why = driver.misplaced(self._voltage)
         if why:
