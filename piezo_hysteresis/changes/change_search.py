@@ -31,9 +31,10 @@ from ..model.model import Model
 from ..record import Record
 from .account import DAY_TO_DAY, FARTHEST, PENALTY, Account
 from .change_kinds import KINDS
-from .signatures import SHAPES, ChangeablePrediction, Shaped, predictions
+from .signatures import SHAPES, ChangeablePrediction, Shaped, delay_of, predictions
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_] | None
 
 SHORTEST, LONGEST = 0.02, 1000.0
 """Range of delays and time constants in the search [samples]."""
@@ -63,6 +64,7 @@ class ChangeSearch:
     def __init__(self, model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float]) -> None:
         self._records = records
         self.predicted, self.loop_share = predictions(model, records)
+        self._earliest = -delay_of(model)
         self.used = list(used)
         self._held: tuple[str, ...] = ()
         self._shapes = SHAPES
@@ -81,6 +83,7 @@ class ChangeSearch:
         """The same search, with the same weights, around another model."""
         found = copy(self)
         found.predicted, found.loop_share = predictions(model, self._records)
+        found._earliest = -delay_of(model)
         return found
 
     def more_cautious(self, factor: float, held: Sequence[str] = ()) -> ChangeSearch:
@@ -131,15 +134,11 @@ class ChangeSearch:
         _, columns = self._columns(account.key, account.size, self.sides)
         return np.vstack(((before - after) / (2.0 * near), self._weighted(columns, self.weights)))
 
-    def account(
-        self, key: str, size: float = 0.0, free: Sequence[str] = (), mask: NDArray[np.bool_] | None = None
-    ) -> Account:
+    def account(self, key: str, size: float = 0.0, free: Sequence[str] = (), mask: Mask = None) -> Account:
         """Least squares for the linear parameters and for a zero in every record, with a change of given size."""
         return self.fitted(key, size, free, mask)[0]
 
-    def fitted(
-        self, key: str, size: float = 0.0, free: Sequence[str] = (), mask: NDArray[np.bool_] | None = None
-    ) -> tuple[Account, Array]:
+    def fitted(self, key: str, size: float = 0.0, free: Sequence[str] = (), mask: Mask = None) -> tuple[Account, Array]:
         """The same account, and the weighted residual that it leaves (n,).
 
         Gain and loop height have a penalty that corresponds to their change from day to day, unless they are in `free`.
@@ -209,19 +208,19 @@ class ChangeSearch:
         power = np.add.reduceat(left**2, np.cumsum([0, *self.sizes[:-1]])) / self.sizes
         return float(np.mean(power) / np.mean([floors[i] ** 2 for i in self.used]))
 
-    def shaped(
-        self, key: str, mask: NDArray[np.bool_] | None = None, near: float | None = None, free: Sequence[str] = ()
-    ) -> Account:
-        """The best size of a delay or of a filter."""
+    def shaped(self, key: str, mask: Mask = None, near: float | None = None, free: Sequence[str] = ()) -> Account:
+        """The best size of a delay, which cannot be earlier than a model without dead time, or of a filter."""
         period = min(p.record.sample_period for p in self.predicted)
         if near is None:
             sizes = period * np.geomspace(SHORTEST, LONGEST, 20)
-            sizes = np.concatenate((-sizes[:10][::-1], sizes)) if key == "delay" else sizes
+            if key == "delay":
+                sizes = np.array([s for s in (*-sizes[9::-1], *sizes) if s >= self._earliest])
             near = float(min(sizes, key=lambda s: self.account(key, float(s), free, mask).cost))
             low, high = sorted((0.4 * near, 2.2 * near))
         else:
             half = max(AROUND * abs(near), AROUND * period)
             low, high = near - half, near + half
+        low = max(low, self._earliest) if key == "delay" else low
         found = scipy.optimize.minimize_scalar(
             lambda s: self.account(key, float(s), free, mask).cost,
             bounds=(low, high),
@@ -230,7 +229,7 @@ class ChangeSearch:
         )
         return self.account(key, float(found.x), free, mask)
 
-    def best(self, key: str, mask: NDArray[np.bool_] | None = None, near: float | None = None) -> Account:
+    def best(self, key: str, mask: Mask = None, near: float | None = None) -> Account:
         """The account of a change with its best size, in the unit of its kind."""
         if key in self._shapes:
             return self.shaped(key, mask, near)

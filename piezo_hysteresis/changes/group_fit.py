@@ -147,14 +147,16 @@ class _Fit:
         onset = self._onset(every, group)
         self._begun = onset + round(TRANSIENT * (len(every) - onset)) if onset else 0
         self._before = every[self._begun :]
+        each = every[0].duration if every else BLOCK_TIME
         if len(self._before) < FEWEST_SCORES:
             raise IdentificationError(
-                f"got {BLOCK_TIME * len(self._before):.1f} s since the change under the kinds of drive of the "
-                f"baseline, expected at least {BLOCK_TIME * FEWEST_SCORES:g} s; try again later"
+                f"got {each * len(self._before):.1f} s since the change under the kinds of drive of the "
+                f"baseline, expected at least {each * FEWEST_SCORES:g} s; try again later"
             )
+        self._duration = each * len(self._before)
         classes = [drive_class(score) for score in self._before]
         self._main = baseline.scatter[max(set(classes), key=classes.count)]
-        self._threshold = false_alarm_threshold(directions(self._main), interval / BLOCK_TIME)
+        self._threshold = false_alarm_threshold(directions(self._main), interval / each)
         count = len(self._before)
         self._known = self._main.inflation(count)[-1] * (
             1.0 + count / min(self._scatter(s).count for s in self._before)
@@ -196,12 +198,11 @@ class _Fit:
         moved = [GROUPS.index(g) for g in groups]
         if (np.abs(found.change[moved]) < SURE * found.deviation[moved]).all():
             raise IdentificationError(
-                f"the change of {names} is smaller than its uncertainty in {BLOCK_TIME * len(self._before):.0f} s; "
-                "try again later"
+                f"the change of {names} is smaller than its uncertainty in {self._duration:.0f} s; try again later"
             )
         offset = self._minute.offset + float(found.change[_OFFSET])
-        duration = BLOCK_TIME * len(self._before)
-        return GroupFit(found.model, offset, groups, found.change, found.deviation, before, after, floor, duration)
+        moved_by = found.change, found.deviation
+        return GroupFit(found.model, offset, groups, *moved_by, before, after, floor, self._duration)
 
     def _scatter(self, score: ChangeScore) -> Scatter:
         return self._baseline.scatter[drive_class(score)]

@@ -50,6 +50,8 @@ from .lag.filtered_signal import derivatives, filtered, shifted
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-9
+"""Dead time [samples] below which there is none."""
 DRIFT_TIME = 3.0
 """Time constant of a drift over the length of the longest record: the drift within a record is almost linear."""
 
@@ -206,20 +208,36 @@ SHAPES: dict[str, Shaped] = {
 
 
 def shaped_model(model: Model, key: str, size: float) -> Model:
-    """The model with a lag: later by `size` [s], or with a low-pass of that time constant [s]."""
+    """The model with a lag: later by `size` [s], or with a low-pass of that time constant [s].
+
+    Raises
+    ------
+    ParameterError
+        If a parameter leaves its bounds, e.g. if it would be earlier by more than `delay_of`.
+    """
     if key == "low_pass_before":
         old = amplifier_of(model) or AmplifierBandwidthHeld()
         new = old.with_values(tau=old["tau"] + size)
         # the hold of the converter stays a delay of the stage
         held = size - (new.lag(model.sample_period)[0] - old.lag(model.sample_period)[0])
-        return shaped_model(model.with_effect(new), "delay", held)
+        return shaped_model(model.with_effect(new), "delay", max(held, -delay_of(model)))
     if KINDS[key].is_filter:
         return with_low_pass(model, size, SECOND_ORDER.get(key))
-    if Arx.name in model and ExtraDelay.name not in model:
-        name = f"{Arx.name}.delay"
-        return model.with_values({name: max(0.0, model.values()[name] + size / model.sample_period)})
-    present = model[ExtraDelay.name]["tau"] if ExtraDelay.name in model else 0.0
-    return model.with_effect(ExtraDelay(tau=max(0.0, present + size)))
+    later = size
+    if ExtraDelay.name in model or Arx.name not in model:
+        tau = size + (model[ExtraDelay.name]["tau"] if ExtraDelay.name in model else 0.0)
+        later = min(tau, 0.0) if Arx.name in model else 0.0
+        model = model.with_effect(ExtraDelay(tau=tau - later))
+    if later:
+        delay = model[Arx.name]["delay"] + later / model.sample_period
+        model = model.with_values({f"{Arx.name}.delay": 0.0 if abs(delay) < ROUNDING else delay})
+    return model
+
+
+def delay_of(model: Model) -> float:
+    """Dead time of a model [s]: no stage that the model describes can respond earlier by more than this."""
+    dynamics = model[Arx.name]["delay"] * model.sample_period if Arx.name in model else 0.0
+    return float(dynamics + (model[ExtraDelay.name]["tau"] if ExtraDelay.name in model else 0.0))
 
 
 def with_low_pass(model: Model, tau: float, zeta: float | None = None) -> Model:

@@ -39,12 +39,12 @@ class Band:
     passed, stopped : float
         Upper end of the pass band, and lower end of the stop band [Hz]; 0 < `passed` < `stopped`.
     length : float
-        Duration of the impulse response [s]; the filter needs the path half of this time ahead.
+        Duration of the impulse response, above 0 [s]; the filter needs the path half of this time ahead.
 
     Raises
     ------
     ModelError
-        If `passed` is not positive or not below `stopped`.
+        If `passed` is not positive or not below `stopped`, or `length` is not positive.
     """
 
     passed: float = 2000.0
@@ -54,6 +54,8 @@ class Band:
     def __post_init__(self) -> None:
         if not 0.0 < self.passed < self.stopped:
             raise ModelError(f"band: got {self.passed:g} to {self.stopped:g} Hz, expected 0 < passed < stopped")
+        if not 0.0 < self.length < np.inf:
+            raise ModelError(f"band: got a length of {self.length:g} s, expected a finite time above 0 s")
 
     @classmethod
     def of(cls, sample_period: float) -> Band:

@@ -82,7 +82,7 @@ def voltage_for(v, d, state):
         down = same if side <= -touching else max(same, d[RESOLUTION])
         pushed = v + d[PLAY] if move > up else v - d[PLAY] if move < -down else state[PUSHED]
     slewed = pushed
-    if d[LEFT] != 0.0:
+    if d[LEAD] != 1.0:
         slewed = (pushed - d[LEFT] * state[POLE] - d[BACK] * state[SLEWED]) / d[LEAD]
     slewed = min(max(slewed, state[SLEWED] - d[REACH]), state[SLEWED] + d[REACH])
     u = before_saturation(slewed, d[LOWER], d[UPPER], d[CORNER])
@@ -206,7 +206,7 @@ if (play > 0.0) {
     const double down = side <= -touching ? same : larger(same, resolution);
     u = move > up ? v + play : move < -down ? v - play : s->pushed;
 }
-if (left != 0.0) {
+if (lead != 1.0) {
     u = (u - left * s->pole - back * s->slewed) / lead;
 }
 u = smaller(larger(u, s->slewed - reach), s->slewed + reach);

@@ -38,6 +38,8 @@ from .program import c_program, model_hash, templates
 
 UNITS = {"s": 's="1"', "V": 'kg="1" m="2" s="-3" A="-1"', "m": 'm="1"', "K": 'K="1"'}
 """Units of the variables, as XML attributes with the exponents of the SI base units."""
+INTERFACE = "fmi3"
+"""Name of the source file with the interface of FMI, of which the unit of a model consists beside its own."""
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
 """Options of the compiler."""
 
@@ -126,8 +128,10 @@ def fmus(model: Model, name: str = "piezo", inverse: Inverse | None = None) -> M
     Raises
     ------
     ModelError
-        As for `c_program`; also if the compiler fails.
+        As for `c_program`; also if the name is that of a source file of every unit, or if the compiler fails.
     """
+    if name == INTERFACE:
+        raise ModelError(f"name: got {name!r}, which every unit contains; expected another name")
     program, digest = c_program(model, name, inverse), model_hash(model)
     further = tuple(CHANNELS[channel] for channel in prediction(model).channels)
     about = f"piezo stage, sample period {model.sample_period!r} s"
@@ -155,7 +159,7 @@ def _packed(part: CoSimulation, model: Model, name: str, program: Mapping[str, s
         return templates().get_template(f"{file}.jinja").render(values)
 
     sources = {file: text for file, text in program.items() if file in (f"{name}.h", f"{name}.c")}
-    sources["fmi3.c"] = rendered("fmi3.c")
+    sources[f"{INTERFACE}.c"] = rendered(f"{INTERFACE}.c")
     held: dict[str, str | bytes] = {"modelDescription.xml": rendered("modelDescription.xml")}
     held |= {f"sources/{file}": text for file, text in sources.items()}
     held["sources/buildDescription.xml"] = rendered("buildDescription.xml")

@@ -68,10 +68,12 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
     Raises
     ------
     ModelError
-        If the name is not a lower-case C identifier, or an effect has no C form.
+        If the name is not a lower-case C identifier, an effect has no C form, or the inverse is that of another model.
     """
     if not NAME.fullmatch(name):
         raise ModelError(f"name: got {name!r}, expected lower-case letters, digits and '_', a letter first")
+    if inverse is not None and model_hash(inverse.model) != model_hash(model):
+        raise ModelError("inverse: got that of another model, expected that of the model to export")
     found = prediction(model)
     values = {
         "name": name,

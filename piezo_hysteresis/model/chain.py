@@ -116,12 +116,14 @@ class Chain:
         Parameters
         ----------
         voltage : float
-            Drive voltage [V].
+            Drive voltage [V]; ModelError if it is not finite.
         time : float
             Of the first sample [s].
         since : float, optional
             Time since which the stage has been settled [s]; default `time`.
         """
+        if not np.isfinite(voltage):
+            raise ModelError(f"rest: got {voltage:g} V, expected a finite voltage")
         states, inputs, x = [], [], float(voltage)
         for block in self.blocks:
             state = block.rest(x, time if since is None else since)

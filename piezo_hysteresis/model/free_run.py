@@ -136,6 +136,13 @@ def standard_errors(model: Model, records: Iterable[Record]) -> list[Array]:
     return found
 
 
+def after_hold(model: Model, state: ChainState, voltage: float, samples: int) -> ChainState:
+    """State after many samples at one voltage [V], in a few long steps: the dynamics have settled long before."""
+    chain, steps = model.at(state.sample_period), min(samples, HOLD_STEPS)
+    slow = model.at(samples / steps * state.sample_period)
+    return chain.resume(slow.run(np.full(steps, voltage), slow.resume(state))[1])
+
+
 def _with_holds(records: Iterable[Record]) -> Iterator[tuple[int | None, Record]]:
     """Records with their index, and without an index the holds between them, during which the stage moves on."""
     before: Record | None = None

@@ -16,6 +16,9 @@
 
 from __future__ import annotations
 
+import math
+
+from ..errors import ParameterError
 from ..model.model import Model
 from .sensor_offset import SensorOffset
 from .voltage_history import VoltageHistory
@@ -56,7 +59,14 @@ class ModelSwap:
             Model to change to.
         offset : float or None
             Its sensor offset [m]; None if it is unknown.
+
+        Raises
+        ------
+        ParameterError
+            If the offset is not finite.
         """
+        if offset is not None and not math.isfinite(offset):
+            raise ParameterError(f"offset: got {offset:g} m, expected a finite number")
         self._waiting = model, offset
 
     def advance(self, received: int, history: VoltageHistory, zero: SensorOffset) -> Warmup | None:

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DivergenceError, RecordError
 from ..model.chain import Chain, ChainState
+from ..model.free_run import after_hold
 from ..model.model import Model
 from ..model.samples import samples
 from .model_swap import ModelSwap
@@ -52,10 +53,8 @@ class Predictor:
 
     Attributes
     ----------
-    model : Model or None
-        Present model.
-    chain, state : Chain, ChainState or None
-        Its coefficients, and its state after the newest sample.
+    model, chain, state : Model, Chain, ChainState or None
+        Present model, its coefficients, and its state after the newest sample.
     sequence : SequenceCheck
         Counts of received, lost and repeated samples.
 
@@ -68,8 +67,8 @@ class Predictor:
 
     Raises
     ------
-    RecordError
-        If the sample period is outside the limits.
+    RecordError, ParameterError
+        If the sample period is outside the limits, or `rms_time` is not positive.
     ModelError
         If the stream is faster than the model.
 
@@ -83,13 +82,11 @@ class Predictor:
     """
 
     def __init__(self, sample_period: float, model: Model | None = None, rms_time: float = 1.0) -> None:
-        self.sequence = SequenceCheck(sample_period)
-        self.sample_period = sample_period
+        self.sequence, self.sample_period = SequenceCheck(sample_period), sample_period
         self.model = model
         self.chain: Chain | None = None
-        self._swap = ModelSwap()
-        self._joined_moving = False
-        self._rms = RunningRms(max(1, round(rms_time / sample_period)))
+        self._swap, self._joined_moving = ModelSwap(), False
+        self._rms = RunningRms.over(rms_time, sample_period)
         self._begin()
 
     @property
@@ -125,8 +122,8 @@ class Predictor:
 
         Raises
         ------
-        ModelError
-            If the stream is faster than the model; the present model stays.
+        ModelError, ParameterError
+            If the stream is faster than the model, or the offset is not finite; the present model stays.
         DivergenceError
             If the model diverges on the history; the present model stays.
         """
@@ -204,8 +201,7 @@ class Predictor:
         return answer
 
     def _begin(self) -> None:
-        newest = self._swap.newest or self.model
-        self._swap = ModelSwap()
+        newest, self._swap = self._swap.newest or self.model, ModelSwap()
         self._history = VoltageHistory(self.sample_period)
         self.state: ChainState | None = None
         self._zero_from(0)
@@ -222,6 +218,10 @@ class Predictor:
             self._history.mark_unknown()
         gap = min(missing, round(LONGEST_SILENCE / self.sample_period), FULL_SAMPLES)
         self._run(np.full(gap, self._history.last))
+        if missing > gap:
+            self._history.hold(missing - gap)
+            if self.model is not None and self.state is not None:
+                self.state = after_hold(self.model, self.state, self._history.last, missing - gap)
 
     def _run(self, drive: Array) -> Array | None:
         self._history.append(drive)

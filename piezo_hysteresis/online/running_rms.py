@@ -21,6 +21,8 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ParameterError
+
 Array = NDArray[np.float64]
 
 
@@ -42,6 +44,13 @@ class RunningRms:
     def __init__(self, count: int) -> None:
         self._count = count
         self.clear()
+
+    @classmethod
+    def over(cls, duration: float, sample_period: float) -> RunningRms:
+        """The rms over a time [s]; ParameterError if it is not positive."""
+        if not 0.0 < duration < np.inf:
+            raise ParameterError(f"rms_time: got {duration:g} s, expected a finite time above 0 s")
+        return cls(max(1, round(duration / sample_period)))
 
     @property
     def value(self) -> float | None:

@@ -152,6 +152,22 @@ class VoltageHistory:
         if self._kept > 1.5 * self._limit:
             self._average()
 
+    def hold(self, samples: int) -> None:
+        """Add many samples at the newest voltage; only averages of those before them are kept."""
+        last = self.last
+        if samples < 2 * self.factor:
+            self.append(np.full(samples, last))
+            return
+        self.count += samples
+        if not self._has_moved:
+            return
+        before = np.append(self._full[: self._kept], np.full(-self._kept % self.factor, last))
+        held, rest = divmod(samples + self._kept - before.size, self.factor)
+        means = before.reshape(-1, self.factor).mean(axis=1)
+        self._keep_slow(np.concatenate((means, np.full(min(held - 1, 2 * self._slow_limit), last))))
+        self._kept = self.factor + rest
+        self._full = np.full(self._kept, last)
+
     def read(self, position: int, values: int) -> tuple[int, Array]:
         """The voltages of the stream from sample `position` on.
 
@@ -196,13 +212,16 @@ class VoltageHistory:
 
     def _average(self) -> None:
         old = (self._kept - self._limit) // self.factor * self.factor
-        means = self._full[:old].reshape(-1, self.factor).mean(axis=1)
+        self._keep_slow(self._full[:old].reshape(-1, self.factor).mean(axis=1))
+        self._full[: self._kept - old] = self._full[old : self._kept].copy()
+        self._kept -= old
+
+    def _keep_slow(self, means: Array) -> None:
+        """Add averages, and remove the oldest ones if they are too many."""
         self._slow = np.concatenate((self._slow, means))
         if self._slow.size > 1.5 * self._slow_limit:
             self.rest_voltage = float(self._slow[-self._slow_limit - 1])
             self._slow = self._slow[-self._slow_limit :]
-        self._full[: self._kept - old] = self._full[old : self._kept].copy()
-        self._kept -= old
 
 
 def is_held(voltage: Array, tolerance: float = REST_TOLERANCE * USUAL_SCALE) -> bool:

@@ -122,6 +122,19 @@ def test_it_continues_from_the_middle_of_a_motion() -> None:
     assert np.abs(wrong[inverse.preview :] - y).max() > 20 * np.abs(off).max()
 
 
+@pytest.mark.parametrize("samples", [0.01, 0.02, 0.026, 0.03, 0.5])
+def test_a_pole_much_faster_than_a_sample_is_inverted_too(samples: float) -> None:
+    """Its response within the sample has ended, but the ramp between two samples comes later by its time constant."""
+    model = Model((AmplifierBandwidth(tau=samples * 1e-3), BoucWen(), Arx(b=[0.5], delay=1)), 1e-3)
+    inverse = Inverse(model)
+    u = 4.0 - 4.0 * np.cos(2.0 * np.pi * 100.0 * 1e-3 * np.arange(300))
+    y, _ = model.run(u, model.rest(u[0]))
+    command, _ = inverse.command(y, inverse.rest(u[0]))
+    reached, _ = model.run(command, model.rest(u[0]))
+    assert inverse.is_exact
+    np.testing.assert_allclose(reached[inverse.preview :], y, rtol=0.0, atol=1e-12 * np.ptp(y))
+
+
 def test_preview_is_reported_in_samples_and_seconds() -> None:
     inverse = Inverse(Model((BoucWen(), Arx(b=[0.5], delay=5)), PERIOD))
     assert (inverse.preview, inverse.preview_time) == (5, pytest.approx(1e-4))
@@ -146,6 +159,11 @@ def test_invalid_values_are_refused() -> None:
     inverse = Inverse(stage())
     with pytest.raises(ModelError, match="finite"):
         inverse.run([0.0, np.nan], inverse.rest(0.0))
+    with pytest.raises(ModelError, match="rest: got nan V"):
+        inverse.rest(np.nan)
+    for length in (-1.0, np.nan):
+        with pytest.raises(ModelError, match="band: got a length"):
+            Band(1e3, 2e3, length)
 
 
 def _voltage_at(model: Model, y: float) -> float:

@@ -23,7 +23,8 @@ import pytest
 
 from piezo_hysteresis.compensation import Limits, plan, reachable
 from piezo_hysteresis.compensation.expected_error import free_run_error, parameter_error
-from piezo_hysteresis.effects import BoucWen, Creep
+from piezo_hysteresis.effects import AmplifierSaturation, AmplifierSlewLimit, BoucWen, Creep, Effect
+from piezo_hysteresis.effects.drive.amplifier_slew_limit_settling import AmplifierSlewLimitSettling
 from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.model.parameter_covariance import ParameterCovariance
 
@@ -101,6 +102,29 @@ def test_too_high_and_too_fast_are_distinguished() -> None:
     fast = plan(model, triangle(200.0, 2e-6, 6e-6, 4), Limits(0.0, 10.0, 1e3)).reachability
     assert {p.limit for p in fast.parts} == {"max_slew_rate"}
     assert max(p.needed_slew for p in fast.parts) > 1e3
+
+
+@pytest.mark.parametrize(
+    "limit",
+    [AmplifierSaturation(upper=4.5), AmplifierSlewLimit(S=300.0), AmplifierSlewLimitSettling(S=300.0, tau=1e-4)],
+)
+def test_what_the_amplifier_of_the_model_cannot_give_is_not_reachable(limit: Effect) -> None:
+    """The limits of the drive were compared only, and a fifth of the path was missing."""
+    model = stage().with_effect(limit)
+    y = swing(50.0, 3e-6, 9e-6, 2)
+    found = plan(model, y, UNIPOLAR).reachability
+    assert {part.limit for part in found.parts} == {"amplifier"}
+    assert "more than the amplifier of the model gives" in str(found.parts[0])
+    assert max(abs(part.largest) for part in found.parts) > 0.5e-6
+    assert found.nearest is not None and found.nearest.amplitude is not None
+    middle = 0.5 * (y.min() + y.max())
+    assert plan(model, middle + found.nearest.amplitude * (y - middle), UNIPOLAR).reachability.is_whole
+    assert plan(stage(), y, UNIPOLAR).reachability.is_whole
+
+
+@pytest.mark.parametrize("metres", [0.5, 1.0, -1.0, 1e3])
+def test_a_path_in_micrometres_is_out_of_reach(metres: float) -> None:
+    assert not reachable(stage(), UNIPOLAR, np.full(16, metres), search=False).is_whole
 
 
 def test_the_way_back_ends_at_the_first_voltage_inside_the_slew_limit() -> None:

@@ -24,6 +24,7 @@ import pytest
 
 from piezo_hysteresis.compensation import Inverse, Limits
 from piezo_hysteresis.effects import Arx, BoucWen, Creep, Offset, ThermalExpansion
+from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.export import fmus
 from piezo_hysteresis.model.model import Model
 
@@ -160,6 +161,12 @@ def test_invalid_values_are_refused(instance):
             instance.setFloat64([reference], [value])
     with pytest.raises(FMI_ERROR):
         instance.getInt32([2])
+
+
+def test_the_name_of_a_source_file_of_every_unit_is_refused():
+    """The interface replaced the model, and the unit could not be loaded."""
+    with pytest.raises(ModelError, match="name: got 'fmi3'"):
+        fmus(Model((BoucWen(),), 1e-3), "fmi3")
 
 
 def test_without_a_compiler_the_unit_contains_only_sources(monkeypatch, tmp_path):

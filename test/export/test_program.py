@@ -28,6 +28,7 @@ from piezo_hysteresis import __version__
 from piezo_hysteresis.blocks.block import Block
 from piezo_hysteresis.compensation import Inverse, Limits
 from piezo_hysteresis.effects import (
+    AmplifierBandwidth,
     AmplifierSlewLimit,
     Arx,
     BoucWen,
@@ -90,6 +91,16 @@ def test_the_inverse_of_a_loop_with_exponent_passes_at_a_round_slew_limit(tmp_pa
     program = compiled(c_program(model, inverse=Inverse(model)), tmp_path)
     done = subprocess.run([program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
+
+
+@needs_compiler
+def test_the_inverse_of_a_pole_much_faster_than_a_sample_is_exact(tmp_path):
+    model = Model((AmplifierBandwidth(tau=2e-5), BoucWen(), Arx(b=[0.5], delay=1)), 1e-3, 10.0, 1e-5)
+    inverse = Inverse(model)
+    wanted = model.simulate(4.0 - 4.0 * np.cos(2.0 * np.pi * 100.0 * 1e-3 * np.arange(300)))
+    u = run_c(c_program(model, inverse=inverse), tmp_path, 0.0, [wanted], "inverse_")
+    reached = model.simulate(u)[inverse.preview :]
+    np.testing.assert_allclose(reached, wanted[: reached.size], rtol=0.0, atol=1e-12 * np.ptp(wanted))
 
 
 @needs_compiler
@@ -178,6 +189,11 @@ def test_a_block_without_a_c_form_is_refused_by_name(monkeypatch):
     monkeypatch.setattr(SensorNonlinearityBlock, "c_form", Block.c_form)
     with pytest.raises(ModelError, match=r"sensor_nonlinearity: has no C form, so the model cannot be exported"):
         c_program(MODEL.with_effect(SensorNonlinearity(s2=0.01)))
+
+
+def test_the_inverse_of_another_model_is_refused():
+    with pytest.raises(ModelError, match="inverse: got that of another model"):
+        c_program(MODEL, inverse=Inverse(MODEL.with_values({"bouc_wen.A": 0.5})))
 
 
 @pytest.mark.parametrize("name", ["", "2x", "Stage", "a-b", "x/y", "é"])

@@ -175,7 +175,9 @@ def test_a_displacement_that_the_driver_refuses_is_not_said_to_be_held(lab):
     command.publish(command_to_cloud(np.zeros(20_000), PERIOD, "rest"))
     lab.pause(0.5)
     lab.publisher(Float64, "set_displacement").publish(Float64(data=0.4 * STROKE))
-    assert "the driver refused: set_voltage: 'rest' is being played" in node.until("set_displacement", "stopped").message
+    assert (
+        "the driver refused: set_voltage: 'rest' is being played" in node.until("set_displacement", "stopped").message
+    )
 
 
 @pytest.mark.parametrize("metres", [10.0, -1.0])

@@ -24,11 +24,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from piezo_hysteresis.effects import Arx, BoucWen, MainsHum, Offset
-from piezo_hysteresis.errors import DivergenceError, ModelError, RecordError
+from piezo_hysteresis.effects import Arx, BoucWen, Creep, MainsHum, Offset
+from piezo_hysteresis.errors import DivergenceError, ModelError, ParameterError, RecordError
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.online.prediction import Prediction
 from piezo_hysteresis.online.predictor import Predictor
+from piezo_hysteresis.record import Record
 
 Array = NDArray[np.float64]
 
@@ -225,6 +226,43 @@ def test_lost_blocks_are_bridged_by_holding_the_voltage() -> None:
     np.testing.assert_allclose(residual(after), 0.0, atol=1e-18)
     counts = predictor.sequence
     assert (counts.received, counts.lost, counts.repeated, counts.restarts) == (4500, 1500, 0, 0)
+
+
+@pytest.mark.parametrize("seconds", [59.0, 600.0, 3600.0, 86400.0])
+def test_a_long_hold_is_predicted_as_the_simulation_of_it(seconds: float) -> None:
+    """Of a hold of an hour, creep had gone on for a minute only, and nothing said that it was wrong."""
+    period, count = 1e-3, 2000
+    model = Model((BoucWen(), Creep(gamma=0.02)), period, displacement_scale=1e-5)
+    drive = np.concatenate((np.zeros(500), np.linspace(0.0, 5.0, 500), np.full(count - 1000, 5.0)))
+    predictor, later = Predictor(period, model), count + round(seconds / period)
+    before = [predictor.predict(k, k * 10**6, drive[k : k + 100], truth(model, drive)[k : k + 100])
+              for k in range(0, count, 100)]  # fmt: skip
+    back = np.concatenate((np.full(200, 5.0), np.linspace(5.0, 2.0, 300)))
+    first = Record(drive, drive, period, "before")
+    second = Record(back, back, period, "after", start_time=later * period, continues=True)
+    expected = model.simulate([first, second])[1] + before[-1].prediction[-1] - truth(model, drive)[-1]
+    answer = predictor.predict(later, later * 10**6, back, expected, follows_gap=True)
+    assert not answer.warming_up
+    assert np.abs(answer.residual).max() < 1e-4 * np.ptp(expected)
+    predictor.swap(model)  # the history holds the time, too
+    for k in range(500, 40_000, 500):
+        more = np.full(500, back[-1])
+        again = predictor.predict(later + k, (later + k) * 10**6, more, more)
+        if not predictor.is_swapping:
+            break
+    state = predictor.state
+    assert state is not None and state.time == pytest.approx((later + k + 500) * period)
+    assert again.prediction.size == 500
+
+
+def test_invalid_options_are_refused() -> None:
+    for wrong in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ParameterError, match="rms_time: got"):
+            Predictor(PERIOD, MODEL, rms_time=wrong)
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, np.zeros(500), np.zeros(500))
+    with pytest.raises(ParameterError, match="offset: got nan"):
+        predictor.swap(OTHER, offset=np.nan)
 
 
 def test_samples_that_were_never_measured_are_not_lost() -> None:

@@ -81,9 +81,10 @@ class Baseline:
             classes.setdefault(drive_class(score), []).append(score)
         known = {key: Scatter.of(held) for key, held in classes.items() if len(held) >= FEWEST_SCORES}
         if not known:
-            most = max(map(len, classes.values()), default=0)
+            most = max(classes.values(), key=len, default=[])
+            each = f" of {most[0].duration:.2g} s" if most else ""
             raise ModelError(
-                f"baseline: got {most} blocks of 0.1 s under one kind of drive, expected at least {FEWEST_SCORES}; "
+                f"baseline: got {len(most)} blocks{each} under one kind of drive, expected at least {FEWEST_SCORES}; "
                 "drive the stage as in normal use for longer"
             )
         return cls(known, model)

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from .baseline import Baseline, DriveClass, drive_class
 from .false_alarm_threshold import WINDOW, false_alarm_threshold
 from .scatter import Scatter, beside_offset
-from .score import BLOCK_TIME, GROUPS, ChangeScore
+from .score import GROUPS, ChangeScore
 
 Array = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ class ChangeDetector:
         self._offset_scores_left = 0 if same_offset else OFFSET_SCORES
         self._same_offset = same_offset
         self._offset, self._offset_weight = 0.0, 0.0
-        self._interval = false_alarm_interval / BLOCK_TIME
+        self._interval = false_alarm_interval
         self._thresholds: dict[DriveClass, float] = {}
         self._window: list[tuple[Array, Array, int, DriveClass]] = []
 
@@ -108,7 +108,7 @@ class ChangeDetector:
             return Change(watched=True)
         if self._offset_weight:
             gradient = gradient - weight[:, _OFFSET] * (self._offset / self._offset_weight)
-        self._window.append((gradient, weight, score.stamp, key))
+        self._window.append((gradient, weight, score.stamp - round(score.duration * 1e9), key))
         del self._window[:-WINDOW]
         sums = [np.cumsum([row[k] for row in reversed(self._window)], axis=0) for k in (0, 1)]
         gradients, weights = beside_offset(*sums)
@@ -122,11 +122,11 @@ class ChangeDetector:
             variance = self._variance(scatter, weights, _drift(sums[1], scatter.wander))
         group = int(np.argmax(gradients[at] ** 2 / np.where(candidates, weights[at], np.inf)))
         return Change(
-            float(statistic[at, largest]) / self._threshold(key, scatter),
+            float(statistic[at, largest]) / self._threshold(key, scatter, score.duration),
             _alike(group, sums[1][at]),
             float(gradients[at, group] / weights[at, group]),
             float(np.sqrt(variance[at, group] / weights[at, group])),
-            self._window[-1 - int(at)][2] - round(BLOCK_TIME * 1e9),
+            self._window[-1 - int(at)][2],
             True,
         )
 
@@ -153,10 +153,10 @@ class ChangeDetector:
             added += own**2 / np.where(information > 0.0, information, np.inf)
         return added / np.where(weights > 0.0, weights, 1.0)
 
-    def _threshold(self, key: DriveClass, scatter: Scatter) -> float:
+    def _threshold(self, key: DriveClass, scatter: Scatter, duration: float) -> float:
         if key not in self._thresholds:
             tested = _apart_from_offset(directions(scatter))
-            self._thresholds[key] = false_alarm_threshold(tested, self._interval, scatter.memory)
+            self._thresholds[key] = false_alarm_threshold(tested, self._interval / duration, scatter.memory)
         return self._thresholds[key]
 
 

@@ -44,7 +44,7 @@ UNITS = ("1", "1", "s", "1", "m")
 """Units of a change of each group."""
 
 BLOCK_TIME = 0.1
-"""Time that one score covers [s]."""
+"""Time that one score covers [s], unless these are fewer than `FEWEST_SAMPLES`."""
 
 FEWEST_SAMPLES = 16
 """Fewest samples that one score covers."""
@@ -72,6 +72,8 @@ class ChangeScore:
         Time of the last sample [ns].
     power : float
         Mean square of the residual [m²].
+    duration : float
+        Time that the block covers [s].
     """
 
     value: Array
@@ -80,6 +82,7 @@ class ChangeScore:
     speed: float
     stamp: int
     power: float
+    duration: float = BLOCK_TIME
 
     @property
     def offset(self) -> float:
@@ -155,7 +158,8 @@ class Scores:
         done: list[ChangeScore] = []
         while self._held >= self.block_size:
             rows = np.hstack(self._rows)
-            done.append(_score(rows[:, : self.block_size], stamp))
+            after = round((self._held - self.block_size) * self._period * 1e9)
+            done.append(_score(rows[:, : self.block_size], stamp - after, self._period))
             rest = rows[:, self.block_size :].copy()
             self._rows, self._held = [rest], rest.shape[1]
         return done
@@ -169,8 +173,9 @@ def _low_pass(x: Array, decay: float, before: float) -> Array:
     return y
 
 
-def _score(rows: Array, stamp: int) -> ChangeScore:
+def _score(rows: Array, stamp: int, sample_period: float) -> ChangeScore:
     s, e, voltage, speed = rows[:5], rows[5], rows[6], rows[7]
-    root = np.sqrt(s.shape[1])
-    fast = float(np.sqrt(np.mean(speed**2)))
-    return ChangeScore(s @ e / root, s @ s.T / root, float(np.ptp(voltage)), fast, stamp, float(np.mean(e**2)))
+    root = np.sqrt(e.size)
+    fast, power = float(np.sqrt(np.mean(speed**2))), float(np.mean(e**2))
+    duration = e.size * sample_period
+    return ChangeScore(s @ e / root, s @ s.T / root, float(np.ptp(voltage)), fast, stamp, power, duration)

@@ -16,11 +16,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import ParameterError
 from ...model.model import Model
 from ...model.model_parameters import model_hash
 from ..prediction import Prediction
@@ -28,7 +30,7 @@ from ..predictor import Predictor
 from .baseline import Baseline
 from .detector import Change, ChangeDetector
 from .false_alarm_threshold import CLEARED
-from .score import BLOCK_TIME, ChangeScore, Scores, loop_heights
+from .score import ChangeScore, Scores, loop_heights
 
 Array = NDArray[np.float64]
 
@@ -56,6 +58,8 @@ class ChangeWatch:
 
     Raises
     ------
+    ParameterError
+        If the interval is not positive.
     ModelError
         Raised by `add` if the requested baseline cannot be computed.
 
@@ -65,6 +69,8 @@ class ChangeWatch:
     """
 
     def __init__(self, false_alarm_interval: float, baseline: Baseline | None = None) -> None:
+        if not 0.0 < false_alarm_interval < math.inf:
+            raise ParameterError(f"false_alarm_interval: got {false_alarm_interval:g} s, expected a time above 0 s")
         self._interval = false_alarm_interval
         self.baseline = baseline
         self.change, self.since, self.alarms = Change(), 0, 0
@@ -74,17 +80,25 @@ class ChangeWatch:
         self._hash = ""
         self._scores: Scores | None = None
         self._detector: ChangeDetector | None = None
-        self._wanted = 0
+        self._wanted = 0.0
         self._taken: list[ChangeScore] = []
 
     @property
     def is_taking(self) -> bool:
         """Whether a baseline is being taken."""
-        return self._wanted > 0
+        return self._wanted > 0.0
 
     def take_baseline(self, duration: float) -> None:
-        """Take a baseline over the next `duration` of the stream [s]; when complete, it replaces the old one."""
-        self._wanted, self._taken = max(1, round(duration / BLOCK_TIME)), []
+        """Take a baseline over the next `duration` of the stream [s]; when complete, it replaces the old one.
+
+        Raises
+        ------
+        ParameterError
+            If the duration is not positive.
+        """
+        if not 0.0 < duration < math.inf:
+            raise ParameterError(f"baseline: got a duration of {duration:g} s, expected a finite time above 0 s")
+        self._wanted, self._taken = duration, []
 
     def restart(self) -> None:
         """Discard all scores, because the sensor offset was measured again or samples were lost."""
@@ -126,7 +140,7 @@ class ChangeWatch:
         if chain is None or state is None:
             return
         if self._model is not None and model is not self._model:
-            self.since, self._wanted = 0, 0
+            self.since, self._wanted = 0, 0.0
         self._model, self._hash = model, model_hash(model)
         loop = loop_heights(model)
         self._scores = Scores(chain, state, loop, chain.rest_tangent(voltage, loop, state.time))
@@ -140,9 +154,9 @@ class ChangeWatch:
     def _score(self, score: ChangeScore) -> Baseline | None:
         if self._wanted:
             self._taken.append(score)
-            if len(self._taken) < self._wanted:
+            if len(self._taken) < round(self._wanted / score.duration):
                 return None
-            taken, self._wanted, self._taken = self._taken, 0, []
+            taken, self._wanted, self._taken = self._taken, 0.0, []
             self.baseline = Baseline.of(taken, self._hash)
             self.since = 0
             self._watch(self.baseline, same_offset=True)

@@ -26,13 +26,12 @@ from ..guard import guarded
 from ..limiter import Limiter
 from ..stage import Acquired, Description, Samples
 from .daqmx_error import DaqmxError
+from .output_voltage import OutputVoltage
 from .setup import DaqmxSetup
 from .tasks import Tasks
 
 _RAMP_PERIOD = 1e-3
 """Longest time between the samples of a ramp outside a stream [s]."""
-_READ_BACK_ERROR = 2e-3
-"""Largest error of an output that the card reads back itself [V]."""
 _CLIPPED = 0.998
 """Share of the range of the sensor from which a sample counts as clipped."""
 
@@ -56,6 +55,7 @@ class DaqmxStage:
     def __init__(self, setup: DaqmxSetup) -> None:
         self._setup, self._tasks, self._closed, self._is_lost = setup, Tasks(setup), False, False
         self._description = setup.description()
+        self._output = OutputVoltage(setup, self._tasks, self._description)
         self._limiter = Limiter(self._description)
         self._sample_period = self._description.check_sample_period(setup.sample_period)
         self._voltage = self._description.safe_voltage
@@ -64,7 +64,7 @@ class DaqmxStage:
         self._agreement = self._new_agreement()
         try:
             self._tasks.read_once()  # a missing input is reported before anything moves
-            found = self._found()
+            found = self._output.found()
             self._is_blind = found is None
             if found is None and not setup.assume_safe:
                 raise UnknownVoltageError(
@@ -120,7 +120,7 @@ class DaqmxStage:
         goal = self._limiter.goal(voltage)
         with self._guarded():
             self._drain()
-            self._require_unmoved()
+            self._output.require(self._voltage)
             self._go(goal)
 
     def read_displacement(self) -> float:
@@ -136,7 +136,7 @@ class DaqmxStage:
         with self._guarded():
             self._drain()
             readings = self._tasks.read_once()
-            return float(self._measured(readings)) if self._setup.voltage_input else self._voltage
+            return float(self._output.measured(readings)) if self._setup.voltage_input else self._voltage
 
     def safe(self) -> None:
         """Play the samples in the buffer to their end, go to the safe voltage, and end the stream."""
@@ -166,7 +166,7 @@ class DaqmxStage:
 
     def _stream(self, drive: Samples) -> Acquired:
         if not self._tasks.is_running:
-            self._require_unmoved()
+            self._output.require(self._voltage)
             delayed = self._lead + round(self._setup.io_delay / self._sample_period)
             self._waiting = np.full(delayed, self._voltage)
             self._tasks.start(self._sample_period, np.full(self._lead, self._voltage))
@@ -179,43 +179,10 @@ class DaqmxStage:
         if np.array_equal(readings, before) and np.ptp(readings[0]) > 0:
             raise DaqmxError(f"{self._description.name}: got the same {drive.size} samples twice; samples were lost")
         self._readings = readings
-        measured = self._measured(readings) if self._setup.voltage_input else applied
+        measured = self._output.measured(readings) if self._setup.voltage_input else applied
         displacement = readings[0] * self._setup.sensor_gain
         self._agreement.check(applied, measured, displacement)
         return Acquired(measured, displacement)
-
-    def _measured(self, readings: Samples) -> Samples:
-        """Drive voltage from the monitor [V]."""
-        return np.asarray(readings[1] / (self._setup.monitor_gain * self._setup.amplifier_gain))
-
-    def _found(self) -> float | None:
-        """Drive voltage at which the output stands [V]; None if neither card nor monitor reports it."""
-        found, uncertainty = self._tasks.output(), _READ_BACK_ERROR
-        if found is None:
-            if not self._setup.voltage_input:
-                return None
-            found = float(self._measured(self._tasks.read_once()).ravel()[0])
-            uncertainty = self._setup.voltage_tolerance / abs(self._setup.amplifier_gain)
-        d = self._description
-        known = (d.safe_voltage, min(max(found, d.voltage_min), d.voltage_max))
-        near = next((voltage for voltage in known if abs(found - voltage) <= uncertainty), found)
-        self._tasks.include(near)
-        return near
-
-    def _require_unmoved(self) -> None:
-        """DaqmxError if another program has moved the output, from where a first sample would be a step."""
-        found = self._found()
-        if found is not None and abs(found - self._voltage) > self._tolerance:
-            raise DaqmxError(
-                f"{self._description.name}: the output is at {found:g} V, expected {self._voltage:g} V, where this "
-                "driver left it; end the other program that moves it"
-            )
-
-    @property
-    def _tolerance(self) -> float:
-        """Largest error of the voltage that is found at the output [V]."""
-        s = self._setup
-        return max(_READ_BACK_ERROR, s.voltage_tolerance / abs(s.amplifier_gain) if s.voltage_input else 0.0)
 
     def _new_agreement(self) -> Agreement:
         s, d = self._setup, self._description
@@ -246,23 +213,15 @@ class DaqmxStage:
             except DeviceError:
                 self._abort()
         else:
-            self._voltage = self._here()
+            self._voltage = self._output.here()
             if self._voltage != self._description.safe_voltage:
                 self._go(self._description.safe_voltage)
 
     def _abort(self) -> None:
         """End a stream that has failed, and go to the safe voltage from where the output stands, if that is certain."""
         self._tasks.abandon(runs_dry=self._is_blind)
-        self._voltage = self._here()
+        self._voltage = self._output.here()
         self._go(self._description.safe_voltage)
-
-    def _here(self) -> float:
-        """Where the output stands [V]; no stream is running."""
-        reported = self._found()
-        found = self._tasks.last_written if reported is None else reported
-        if found is None:
-            raise DaqmxError(f"{self._description.name}: neither the card nor a monitor reports the output")
-        return found
 
     def _go(self, goal: float) -> None:
         """Go to a voltage [V] by the ramp of the limiter, on the clock of the card; no stream is running."""

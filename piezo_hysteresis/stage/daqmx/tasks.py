@@ -67,12 +67,9 @@ class Tasks:
                 "NI-DAQmx: the package nidaqmx is not installed; install it with pip install 'nidaqmx[grpc]'"
             ) from None
         self._setup, self._nidaqmx = setup, nidaqmx
-        self._channel: Any = None
-        self._calls: Any = None
-        self._output: Any = None
-        self._input: Any = None
-        self._writer: Any = None
-        self._reader: Any = None
+        nothing: Any = None
+        self._channel, self._calls, self._output, self._input = nothing, nothing, nothing, nothing
+        self._writer, self._reader = nothing, nothing
         self._sample_period, self._queued = setup.sample_period, 0.0  # the latter: duration of the output in the buffer
         self.last_written: float | None = None
         self._lowest, self._highest = setup.voltage_min, setup.voltage_max

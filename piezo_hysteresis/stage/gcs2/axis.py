@@ -130,16 +130,18 @@ class Axis:
         """Position [m]."""
         return self.client.number(f"POS? {self.setup.axis}", *self._travel) * self.setup.position_unit
 
-    def open_loop(self) -> None:
-        """Switch the servo off and make sure that it is off.
+    def open_loop(self, expected: float | None = None) -> None:
+        """Switch the servo off and make sure that it is off, and that the drive voltage is the expected one [V].
 
         Raises
         ------
         Gcs2Error
-            If the servo stays on.
+            If the servo stays on, or another program has moved the stage, so that a motion would begin with a step.
         """
         self.client.command(f"SVO {self.setup.axis} 0")
         self.require_servo_off("after it was switched off")
+        if expected is not None:
+            self.require_voltage(expected)
 
     def require_servo_off(self, when: str) -> None:
         """Gcs2Error if the servo is on."""

@@ -109,8 +109,7 @@ class Gcs2Stage:
         self._require_ready()
         goal = self._limiter.goal(voltage)
         with self._guarded():
-            self._axis.open_loop()
-            self._axis.require_voltage(self._voltage)
+            self._axis.open_loop(self._voltage)
             self._go(goal)
 
     def read_voltage(self) -> float:
@@ -142,8 +141,7 @@ class Gcs2Stage:
             raise StageError(f"{self._description.name}: holds no waveform, expected upload() first")
         self._limiter.check(self._waveform, self._voltage, self._sample_period)
         with self._guarded():
-            self._axis.open_loop()
-            self._axis.require_voltage(self._voltage)
+            self._axis.open_loop(self._voltage)
             self._axis.arm(round(self._sample_period / self._axis.servo_time))
         self._forget()
         self._armed = True

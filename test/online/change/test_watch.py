@@ -19,7 +19,7 @@ import pytest
 from scipy.signal import lfilter
 
 from piezo_hysteresis.effects import Arx, BoucWen, Creep, HysteresisMemory
-from piezo_hysteresis.errors import ModelError
+from piezo_hysteresis.errors import ModelError, ParameterError
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.model_parameters import model_hash
 from piezo_hysteresis.online.change.baseline import Baseline, drive_class
@@ -134,6 +134,45 @@ def test_a_change_is_found_with_its_group_and_its_onset(drive, group):
     assert watch.change.statistic > 1.0
     assert group in watch.change.groups
     assert abs(watch.since * 1e-9 - late * PERIOD) < 1.0
+
+
+def watched(period, seconds, block, *, change=np.inf, baseline=20.0):
+    """A watch of a stage whose gain changes at a time [s], in blocks of samples, and when its baseline ended [s]."""
+    model = Model((BoucWen(),), period, displacement_scale=1e-5)
+    time = period * np.arange(round(seconds / period))
+    drive = 3.0 * (1.0 - np.cos(0.2 / period * np.maximum(time - 1.0, 0.0) * 2 * np.pi * 0.01))
+    y = run(model, drive) * np.where(time >= change, 1.01, 1.0)
+    y += 1e-9 * np.random.default_rng(3).standard_normal(time.size)
+    predictor, watch, ended = Predictor(period, model), ChangeWatch(600.0), np.nan
+    watch.take_baseline(baseline)
+    for first in range(0, time.size, block):
+        part = slice(first, first + block)
+        answer = predictor.predict(first, round(first * period * 1e9), drive[part], y[part])
+        last = first + drive[part].size - 1
+        if watch.add(drive[part], answer, predictor, round(last * period * 1e9)) is not None:
+            ended = last * period
+    return watch, ended
+
+
+def test_a_baseline_takes_the_time_that_was_asked_for_at_slow_samples():
+    """A score covers 16 samples at least, and was counted as 0.1 s."""
+    _, ended = watched(0.1, 340.0, 10, baseline=300.0)
+    assert ended == pytest.approx(300.0, abs=4.0)
+
+
+@pytest.mark.parametrize("block", [100, 2000, 5000])
+def test_the_onset_does_not_depend_on_the_blocks_of_the_stream(block):
+    """All scores of a block had the time of its end."""
+    watch, _ = watched(1e-3, 80.0, block, change=60.0)
+    assert watch.since * 1e-9 == pytest.approx(60.0, abs=0.15)
+
+
+def test_invalid_times_are_refused():
+    for wrong in (-5.0, 0.0, np.nan, np.inf):
+        with pytest.raises(ParameterError, match="expected"):
+            ChangeWatch(wrong)
+        with pytest.raises(ParameterError, match="expected"):
+            ChangeWatch(600.0).take_baseline(wrong)
 
 
 def test_the_loop_of_play_operators_is_watched(drive):
