@@ -168,7 +168,9 @@ def _answer(state: DiagnosisState) -> Diagnosis:
         cause = error.__cause__ or error  # a fit from diverging start values
         if state.model is None or not isinstance(cause, DivergenceError):
             raise
-        return _searched(_without_given_model(state, cause))
+        said = f"the given model diverges on these records ({cause}); "
+        noted = Notice(GIVEN_DIVERGES, said + "the diagnosis begins with one identified from them")
+        return _searched(replace(state, model=None, experiment=state.experiment.noting(noted)))
 
 
 def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosis:
@@ -176,13 +178,7 @@ def compare_with_given_model(state: DiagnosisState) -> DiagnosisState | Diagnosi
     model = state.model
     if model is None:
         return state
-    found = same_stage(
-        state.experiment,
-        model,
-        state.moving,
-        lambda part: state.progress("changes of the given model", 0.1 * part),
-        state.given,
-    )
+    found = same_stage(state, model)
     if isinstance(found, Notice):
         state, found = replace(state, experiment=state.experiment.noting(found)), None
     return found or replace(state, model=without_corrections(model))
@@ -193,12 +189,6 @@ def _searched(state: DiagnosisState) -> Diagnosis:
     needs_structure = state.model is None and not roles_of(state.experiment).broadband
     is_many = len(state.moving) >= FEWEST_RECORDS and not needs_structure
     return diagnose_many(state) if is_many else diagnose_few(state)
-
-
-def _without_given_model(state: DiagnosisState, error: DivergenceError) -> DiagnosisState:
-    """Continue with a model identified from the records, because the given one diverges on them."""
-    said = f"the given model diverges on these records ({error}); the diagnosis begins with one identified from them"
-    return replace(state, model=None, experiment=state.experiment.noting(Notice(GIVEN_DIVERGES, said)))
 
 
 def compared_with_given(found: Diagnosis) -> Diagnosis:

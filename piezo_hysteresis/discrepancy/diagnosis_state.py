@@ -37,22 +37,8 @@ IDLE = ("idle", "hold", CONDITIONING)
 class DiagnosisState:
     """The experiment and the options of a diagnosis, between two of its steps.
 
-    Parameters
-    ----------
-    experiment : Experiment
-        Experiment that is compared with models.
-    model : Model or None
-        Model with which the search begins; None if it has to be identified.
-    effects : collection of Effect classes
-        Effects to choose from.
-    progress : callable
-        Called with a message and the fraction done.
-    end : float
-        Time at which the search for effects has to end, on the clock of `time.monotonic` [s].
-    explicit_step : bool
-        Whether the error of an explicit step of the loop may be subtracted.
-    given : Experiment or None
-        The experiment as it was recorded, before it was prepared.
+    The options are those of `diagnose`. The search has to end at the time `end` on the clock of `time.monotonic` [s];
+    `given` is the experiment as it was recorded, before it was prepared.
     """
 
     experiment: Experiment

@@ -16,21 +16,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from ..errors import DivergenceError
+from ..identification.fit.fit import Fit
+from ..identification.fit.form_uncertainty import with_form_uncertainty
 from ..identification.fit.time_limit import ending_at
+from ..identification.records.excitation_check import missing_excitation
 from ..identification.records.noise_floor import ADEQUATE
 from ..model.model import Model
-from .conclusion import concluded
+from .choice.next_experiment import best_next_experiment
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .explicit_step import explicit_model, without_steps
+from .gap import Gap, measure_gap
 from .localise import ResidualShare, located
 from .search.baseline_setup import BaselineSetup, prepare_baseline
+from .search.refit import LAST, PRECISE, TOLERANCE, joint, restart
 from .search.selection import select
 from .search.selection_result import Selection
-from .verdict import Conclusion
+from .search.training_data import TrainingData
+from .unnamed.offer import best_correction
+from .verdict import Conclusion, Verdict, is_explained, named_conclusion, unnamed_conclusion
 
 STEPS_LEAVE = 10.0
 """Largest cost after the subtraction of an explicit step, if it is subtracted before the search."""
@@ -39,6 +48,14 @@ EXPLICIT = (
     "Diagnose them with --explicit-step (Python: explicit_step=True)."
 )
 """Reason if the error of the explicit step may not be subtracted."""
+NOISY, WORTHWHILE = 1.1, 0.95
+"""Ratio of the cost to the cost of noise above which the last fit is restarted, and largest ratio of the new cost to
+the old one for which the new fit is kept and tested again."""
+DIVERGES = (
+    "No effect is named: the model without further effects diverges on a test record, which may move further than the "
+    "records that were fitted. The gap is that of the fitted records."
+)
+"""Reason of the answer if there is no error on the test records."""
 
 
 def diagnose_many(state: DiagnosisState) -> Diagnosis:
@@ -54,7 +71,9 @@ def diagnose_many(state: DiagnosisState) -> Diagnosis:
         explicit = explicit_model(setup.baseline.model, setup.training_data, STEPS_LEAVE)
     selection = _search(state, setup) if explicit is None else None
     if selection is not None and selection.in_time:
-        explicit = _explicit_model(selection)
+        bests = (s.best for s in selection.accepted if s.best.score.excess > ADEQUATE)
+        models = (explicit_model(best.fit.model, best.training_data) for best in bests)
+        explicit = next((model for model in models if model is not None), None)
     if explicit is not None:
         if not state.explicit_step:
             model, where = setup.baseline.model, _where(state, setup)
@@ -67,7 +86,7 @@ def diagnose_many(state: DiagnosisState) -> Diagnosis:
         sharper = _baseline(state, selection)
         again = _search(state, sharper)
         setup, selection = (sharper, again) if again.in_time else (setup, selection)
-    return concluded(state.experiment, setup, _where(state, setup), selection, state.progress, state.model)
+    return _concluded(state, setup, selection)
 
 
 def _baseline(state: DiagnosisState, known: Selection | None = None) -> BaselineSetup:
@@ -77,22 +96,9 @@ def _baseline(state: DiagnosisState, known: Selection | None = None) -> Baseline
 
 
 def _search(state: DiagnosisState, setup: BaselineSetup) -> Selection:
-    model, training_data = setup.baseline.model, setup.training_data
-
-    def progress(word: str, part: float) -> None:
-        state.progress(word, 0.4 + 0.4 * part)
-
+    model, data = setup.baseline.model, setup.training_data
     with ending_at(state.end):
-        return select(model, training_data, setup.score, state.effects, progress)
-
-
-def _explicit_model(selection: Selection) -> Model | None:
-    """Model of data with explicit steps, from the first effects with which the data show them."""
-    for best in (s.best for s in selection.accepted if s.best.score.excess > ADEQUATE):
-        explicit = explicit_model(best.fit.model, best.training_data)
-        if explicit is not None:
-            return explicit
-    return None
+        return select(model, data, setup.score, state.effects, lambda w, f: state.progress(w, 0.4 + 0.4 * f))
 
 
 def _where(state: DiagnosisState, setup: BaselineSetup) -> tuple[ResidualShare, ...]:
@@ -102,3 +108,86 @@ def _where(state: DiagnosisState, setup: BaselineSetup) -> tuple[ResidualShare, 
         return located(model, setup.records, setup.usable, least)
     except DivergenceError:  # on a test record, which moves further than those that were fitted
         return located(model, setup.records, setup.fitted, least)
+
+
+def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection) -> Diagnosis:
+    """The last fits, the gap on the test records, the verdict, and the next experiment.
+
+    The gap before is the own error of a given model, not that after a joint fit. It stays the model where no effect is
+    named and the joint fit predicts the test records worse.
+    """
+    where, given = _where(state, setup), state.model
+    state.progress("gap", 0.85)
+    whole, noise = setup.for_last_fit()
+    named = is_explained(selection)
+    first = joint(selection.baseline, whole, LAST, TOLERANCE if named else PRECISE)
+
+    def gap_of(before: Model, after: Model, chosen: Sequence[int], *, offset: bool = False) -> Gap:
+        unseen = chosen is setup.test_records
+        both, least = (before, after), setup.least.tolist()
+        return measure_gap(both, setup.records, chosen, least, setup.span, unseen=unseen, offset=offset)
+
+    tested = setup.test_records or setup.fitted
+    falls = diverges = False
+    if named:
+        final = _finished(selection, whole)
+        with suppress(DivergenceError):  # on a test record, which moves further than those that were fitted
+            gap = gap_of(first.model, final.model, tested)
+            falls = gap.falls
+    if not falls:
+        final = first
+        try:
+            gap = gap_of(first.model, first.model, tested)
+        except DivergenceError:
+            tested, diverges = setup.fitted, True
+            gap = gap_of(first.model, first.model, tested)
+    free = whole.free_with(final.model)
+    final = with_form_uncertainty(final, whole.records, free, whole.floors, noise, setup.span)
+    state.progress("next experiment", 0.95)
+    if diverges:
+        said = Conclusion.INSUFFICIENT_DATA, DIVERGES
+    elif not falls:
+        said = unnamed_conclusion(selection, not named, gap)
+    delivered = final.stated_model
+    fit: Fit | None = final
+    if given is not None:
+        with suppress(DivergenceError):
+            gap = gap_of(given, delivered, tested, offset=True)
+            if not falls and gap.after > gap.before:  # a refit that names nothing must not predict worse
+                delivered, fit = given, None
+                gap = gap_of(given, given, tested, offset=True)
+    if falls:
+        said = named_conclusion(selection, gap)
+    conclusion, reason = said
+    is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
+    found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
+    noted = state.experiment.noting(*missing_excitation(setup.records, setup.usable, found))
+    everywhere = None
+    if delivered is not given and len(tested) < len(setup.usable):
+        with suppress(DivergenceError):
+            everywhere = gap_of(delivered, delivered, setup.usable, offset=given is not None)
+    return Diagnosis(
+        conclusion,
+        reason,
+        model=given if delivered is given else gap.stated_by(delivered, noted, everywhere),
+        baseline=first.stated_model if given is None else given,
+        experiment=noted,
+        selection=selection,
+        fit=fit,
+        where=where,
+        gap=gap,
+        next_experiment=best_next_experiment(selection, setup.training_data),
+        correction=best_correction(final.model, setup, state.experiment) if is_unexplained else None,
+    )
+
+
+def _finished(selection: Selection, training_data: TrainingData) -> Fit:
+    """The last fit of the named effects; restarted with newly estimated dynamics while this reduces the cost."""
+    final = joint(selection.model, training_data, LAST, PRECISE)
+    last = selection.accepted[-1].best
+    while final.cost > NOISY * training_data.null:
+        anew = restart(replace(last, effect=final.model[last.name], training_data=training_data, fit=final), LAST).fit
+        if anew.cost > WORTHWHILE * final.cost:
+            break
+        final = anew
+    return final

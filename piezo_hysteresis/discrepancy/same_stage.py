@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,64 +29,41 @@ from ..identification.records.comparable import comparable
 from ..identification.records.noise_floor import floors, noise_floors, stroke
 from ..model.model import Model
 from ..model.provenance import LARGEST, MOVING, data_hash, known_error, knows_unseen_records, record_errors
-from ..record import Experiment, Notice, Record
+from ..record import Notice, Record
 from .diagnosis import Diagnosis
+from .diagnosis_state import DiagnosisState
 from .gap import measure_gap
 from .localise import located
 from .verdict import Conclusion
 
-HASH = "data_hash"
-"""Key of the provenance."""
 UNCHANGED_STAGE = "unchanged"
 """Kind of the notice that the given model is still as good as when it was identified, as far as its error shows."""
 
 
-def same_stage(
-    experiment: Experiment,
-    model: Model,
-    used: Sequence[int],
-    progress: Callable[[float], None],
-    given: Experiment | None = None,
-) -> Diagnosis | Notice | None:
-    """Name the parameter that has changed since `model` was identified.
+def same_stage(state: DiagnosisState, model: Model) -> Diagnosis | Notice | None:
+    """Name the parameter that has changed since the given model was identified.
 
-    The data that the model was identified from show no change.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        Experiment after the change.
-    model : Model
-        Model identified before the change, from other data.
-    used : sequence of int
-        Indices of the records to explain.
-    progress : callable
-        Called with the fraction done.
-    given : Experiment, optional
-        The experiment as it was recorded, if `experiment` has been prepared.
-
-    Returns
-    -------
-    Diagnosis, Notice or None
-        The changed parameter. A notice that no change is visible, or that the error has grown although no changed
-        parameter explains it; None if the model does not state its error, or diverges.
+    Otherwise a notice that no change is visible, or that the error has grown although no changed parameter explains it.
+    None if the model does not state its error or diverges, or was identified from these data, which show no change.
     """
-    records = experiment.records
-    recorded = experiment if given is None else given
+    experiment, records, used = state.experiment, state.experiment.records, state.moving
+    recorded = experiment if state.given is None else state.given
     hashes = {data_hash(e) for e in (experiment, recorded, comparable(recorded)[0])}
-    if model.provenance.get(HASH) in hashes or not used:
+    if model.provenance.get("data_hash") in hashes or not used:
         return None
     least = floors(records, noise_floors(records))
     known = known_error(model, MOVING)
     limits = np.maximum(least, known).tolist()
     try:
-        change = find_change(model, records, used, limits, progress)
+        change = find_change(
+            model, records, used, limits, lambda part: state.progress("changes of the given model", 0.1 * part)
+        )
         if change is None:
             return _without_change(model, records, used, limits) if known else None
         changed = changed_model(model, change, records)
         where = located(model, records, used, least.tolist(), offset=True)
         both, span = (model, changed), stroke(records)
-        gap = measure_gap(both, records, list(used), least.tolist(), span, unseen=False, offset=True)
+        gap = measure_gap(both, records, used, least.tolist(), span, unseen=False, offset=True)
     except (DivergenceError, ModelError, ParameterError):
         return None
     if not gap.after < gap.before:
@@ -96,12 +73,9 @@ def same_stage(
         reason=sentence_of(change),
         model=_stated(model, gap.stated_by(changed, experiment)),
         baseline=model,
-        selection=None,
-        fit=None,
+        experiment=experiment,
         where=where,
         gap=gap,
-        next_experiment=None,
-        experiment=experiment,
         change=change,
     )
 

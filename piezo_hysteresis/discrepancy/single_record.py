@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ..effects import ExtraResonance
 from ..errors import PiezoError
@@ -42,27 +42,19 @@ from ..identification.structure.left_out import has_several_drives, score_left_o
 from ..identification.structure.structure_choice import LEADS
 from ..model.model import Model
 from ..record import Notice, Record
-from .conclusion import answered
+from .choice.next_experiment import best_next_experiment
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .gap import Gap, measure_gap
 from .localise import located
 from .search.baseline_setup import with_zero
 from .search.candidates import loop_is_off, score_model
-from .search.record_blocks import training_data_of
 from .search.refit import LAST, joint
 from .search.selection import select
 from .search.selection_result import Selection, Step
 from .search.structure_steps import structure_steps
-from .search.training_data import choose_test_records
-from .verdict import (
-    FEWEST_RECORDS,
-    MORE_MAY_BE_MISSING,
-    Conclusion,
-    is_explained,
-    named_conclusion,
-    unnamed_conclusion,
-)
+from .search.training_data import choose_test_records, training_data_of
+from .verdict import FEWEST_RECORDS, MORE_MAY_BE_MISSING, Conclusion, is_explained, named_conclusion, unnamed_conclusion
 
 SHARP = 1e-6
 """Relative decrease of the cost at convergence of the baseline: few records take little time."""
@@ -87,14 +79,6 @@ ONLY_A_LAG = (
 """What is said of a resonance that the dynamics of the published model could contain."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Delivered:
-    """The saved model and its fit."""
-
-    model: Model
-    fit: Fit | None
-
-
 def diagnose_few(state: DiagnosisState) -> Diagnosis:
     """Extend the best model while cross-validation improves, and name the effects that are certain.
 
@@ -116,7 +100,7 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
             in_time = False
     start = found.model if found else published
     noise, span = noise_floors(records), experiment.range
-    least = floors(records, noise)
+    least = floors(records, noise).tolist()
     short = shortened(records, SEARCHED)
     quiet = noise_of_averages(noise, records, short)
     short_least = floors(short, quiet)
@@ -126,70 +110,82 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     if before.excess > ADEQUATE:
         start_helpers()  # effects will be searched for
     progress("location of the residual", 0.5)
-    where = located(baseline.model, records, fitted, least.tolist(), offset=True)
+    where = located(baseline.model, records, fitted, least, offset=True)
 
     steps: list[Step] = []
     now, score = (found.fit, score_model(start, training_data)) if found else (baseline, before)
     several = has_several_drives(records, fitted)
-    if found and found.structure and before.excess > ADEQUATE and several:
-        steps = structure_steps(
-            found, found.structure.leads, before, training_data, short, short_least.tolist(), fitted
-        )
+    if found and before.excess > ADEQUATE and several:
+        steps = structure_steps(found, before, training_data, short, short_least.tolist(), fitted)
     is_certain = bool(steps)
     fitting = [e for e in state.effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
     with ending_at(state.end):
         more = select(now.model, training_data, score, fitting, lambda word, part: progress(word, 0.6 + 0.3 * part))
     chosen = sorted(aside or fitted)
-    final = _Delivered(start, found.fit if found else None)
-    contenders = [] if found else [_Delivered(now.stated_model, now)]
+    contenders = [] if found else [now]
     enough = len(used) >= FEWEST_RECORDS and several
     if more.accepted and (enough or not is_certain):  # few records do not show an effect beside a certain one
-        last = more.accepted[-1].best
-        contenders.append(_Delivered(last.fit.stated_model, last.fit))
+        contenders.append(more.accepted[-1].best.fit)
+    final, fit = start, found.fit if found else None
+    lead = LEADS if is_certain else EXTENDS
+    best = None
     if contenders:
-        final = _best(final, contenders, records, least.tolist(), fitted, chosen, LEADS if is_certain else EXTENDS)
-    if more.accepted and contenders and final is contenders[-1]:
+        best = _best(start, fit is not None, contenders, records, least, fitted, chosen, lead)
+    if best is not None:
+        final, fit = best.stated_model, best
+    if more.accepted and best is more.accepted[-1].best.fit:
         steps, score = [*steps, *more.steps], more.score
     else:
         steps = [*steps, *(replace(s, accepted=False) for s in more.steps)]
-    selection = Selection(baseline.model, final.model, score, tuple(steps), more.null, in_time and more.in_time)
+    selection = Selection(baseline.model, final, score, tuple(steps), more.null, in_time and more.in_time)
 
     progress("gap", 0.9)
     first = model or baseline.model  # the gap of a given model is measured before any refit
-    both = first, final.model
-    gap = measure_gap(both, records, chosen, least.tolist(), span, unseen=bool(aside), offset=True)
+    gap = measure_gap((first, final), records, chosen, least, span, unseen=bool(aside), offset=True)
     shown = {s.best.effect.public_name() for s in selection.accepted}
     missing = missing_excitation(records, used, shown)
-    origin = CHOSEN if found else REFITTED if final.fit is not None else KEPT
+    origin = CHOSEN if found else KEPT if fit is None else REFITTED
     said = conclusion_of_few(selection, is_certain, before, gap, len(used), several, missing, origin)
     if said[0] is Conclusion.MISSING_EFFECT and model is None and ExtraResonance.name in shown:
         said = said[0], said[1] + ("" if roles_of(experiment).broadband else ONLY_A_LAG)
     everywhere = None
-    if aside and final.model is not model:
-        both_new = final.model, final.model
-        everywhere = measure_gap(both_new, records, used, least.tolist(), span, unseen=False, offset=True)
-    gaps, noted = (gap, everywhere), experiment.noting(*missing)
-    return answered(noted, said, both, model, final.fit, gaps, selection, training_data, where)
+    if aside and final is not model:
+        everywhere = measure_gap((final, final), records, used, least, span, unseen=False, offset=True)
+    noted = experiment.noting(*missing)
+    return Diagnosis(
+        *said,
+        model=model if final is model else gap.stated_by(final, noted, everywhere),
+        baseline=first,
+        experiment=noted,
+        selection=selection,
+        fit=fit,
+        where=where,
+        gap=gap,
+        next_experiment=best_next_experiment(selection, training_data),
+    )
 
 
 def _best(
-    start: _Delivered,
-    contenders: Sequence[_Delivered],
+    start: Model,
+    adjusts: bool,
+    contenders: Sequence[Fit],
     records: Sequence[Record],
     least: Sequence[float],
     fitted: Collection[int],
     tested: Sequence[int],
     lead: float,
-) -> _Delivered:
-    """The model that predicts rates, amplitudes and records left out best, by `lead`; the start stays if none does.
+) -> Fit | None:
+    """The fit that predicts rates, amplitudes and records left out best, by `lead`; None if the start stays.
 
-    A model that diverges on a test record is not taken.
+    A model that diverges on a test record is not taken. `adjusts` says whether the start was fitted to these records.
     """
-    best, reached = start, score_left_out(start.model, records, least, fitted, adjusts=start.fit is not None)
+    best: Fit | None = None
+    reached = score_left_out(start, records, least, fitted, adjusts=adjusts)
     for contender in contenders:
+        model = contender.stated_model
         with suppress(PiezoError):
-            score = score_left_out(contender.model, records, least, fitted)
-            contender.model.free_run([records[i] for i in with_conditioning(records, tested)])
+            score = score_left_out(model, records, least, fitted)
+            model.free_run([records[i] for i in with_conditioning(records, tested)])
             if score < reached - lead:
                 best, reached = contender, score
     return best

@@ -87,14 +87,6 @@ def is_explained(selection: Selection) -> bool:
     return bool(selection.accepted) and selection.explained(selection.score) >= share
 
 
-def not_predicted_live(name: str, live: float) -> str:
-    """Message about an effect that is fitted to every recording separately; `live` in % of range."""
-    return (
-        f"{name.replace('_', ' ').capitalize()} was fitted to each recording separately. It cannot "
-        f"be predicted live, where an error of {live:.2g} % of range remains."
-    )
-
-
 def named_conclusion(selection: Selection, gap: Gap) -> tuple[Conclusion, str]:
     """The conclusion and its reason if the effects of the search are named."""
     accepted = [s.best.effect for s in selection.accepted]
@@ -113,8 +105,12 @@ def named_conclusion(selection: Selection, gap: Gap) -> tuple[Conclusion, str]:
         )
     if not selection.in_time:
         said += MORE_MAY_BE_MISSING
-    fitted = [e.public_name() for e in accepted if not e.is_predicted_live()]
-    return Conclusion.MISSING_EFFECT, " ".join([said, *(not_predicted_live(name, gap.live) for name in fitted)])
+    for name in (e.public_name() for e in accepted if not e.is_predicted_live()):
+        said += (
+            f" {name.replace('_', ' ').capitalize()} was fitted to each recording separately. It cannot be predicted "
+            f"live, where an error of {gap.live:.2g} % of range remains."
+        )
+    return Conclusion.MISSING_EFFECT, said
 
 
 def unnamed_conclusion(selection: Selection, falls: bool, gap: Gap) -> tuple[Conclusion, str]:

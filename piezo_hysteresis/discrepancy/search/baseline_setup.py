@@ -33,7 +33,7 @@ from ...identification.cores import start_helpers
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.form_uncertainty import ADEQUACY
-from ...identification.records.conditioning import path_of, records_to_fit
+from ...identification.records.conditioning import path_of, with_conditioning
 from ...identification.records.intersample_error import intersample_error
 from ...identification.records.noise_floor import noise_floors, noise_of_averages, stroke
 from ...identification.records.sampling import at_period, common_period, less, shortened, slowed
@@ -59,25 +59,10 @@ UNSURE = 0.3
 class BaselineSetup:
     """The starting point of a search for effects.
 
-    Parameters
-    ----------
-    given, records : tuple of Record
-        In experiment order, at the period of the dynamics or slower; without and with the correction of the
-        inter-sample error.
-    lost : list of (n,) ndarray
-        The inter-sample error by record [m].
-    noise, least : (r,) ndarray
-        Noise and floor of every record [m]; those of the training records are lower where these are averages.
-    span : float
-        Range of the displacement [m].
-    usable, fitted, test_records : sequence of int
-        Indices of the usable records, the training records and the test records.
-    training_data : TrainingData
-        The training records, shortened.
-    baseline : Fit
-        Fit of the model without further effects.
-    score : Score
-        Score of the baseline.
+    All records, `given` and `records`, are at the period of the dynamics or slower, without and with the correction of
+    the inter-sample error `lost` [m]. `noise` and `least` are their noise and floor [m]; those of the `training_data`,
+    which are the `fitted` records shortened, are lower where these are averages. `span` is the range of the
+    displacement [m].
     """
 
     given: tuple[Record, ...]
@@ -180,12 +165,11 @@ def _short(
     """
     short = shortened(records, most)
     noise = noise_of_averages(noise, records, short)
-    kept, least = records_to_fit(short, _floors(noise, span, lost).tolist(), fitted)
-    quiet = records_to_fit(short, noise.tolist(), fitted)[1]
+    least = _floors(noise, span, lost)
     parts = [
-        (part, floor, own)
-        for record, floor, own in zip(kept, least, quiet, strict=True)
-        for part in ((record,) if np.isfinite(floor) else path_of(record, most))
+        (part, least[i], noise[i]) if i in fitted else (part, np.inf, np.inf)
+        for i in with_conditioning(short, fitted)
+        for part in ((short[i],) if i in fitted else path_of(short[i], most))
     ]
     return tuple(p for p, _, _ in parts), np.array([f for _, f, _ in parts]), np.array([n for _, _, n in parts])
 

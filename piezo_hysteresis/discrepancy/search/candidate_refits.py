@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -38,9 +38,6 @@ WORTHWHILE = 0.8
 """Ratio of the new to the old cost above which a refit is not repeated."""
 TIE = 0.02
 """Difference in gain up to which the form and the effect with the fewest parameters are taken."""
-
-Fitter = Callable[[Candidate], FittedCandidate | None]
-"""Fits a candidate; None if this diverges."""
 
 
 def leaves_room(score: Score) -> bool:
@@ -80,12 +77,7 @@ def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], be
     """
     is_far = before.excess > ADEQUATE
     bending = [c for c in candidates if _bends_dynamics(c) and (is_far or c.effect.family == LAG)]
-    return collected(partial(_settled, partial(from_all_starts, model), before), bending)
-
-
-def _settled(fit: Fitter, before: Score, candidate: Candidate) -> FittedCandidate | None:
-    found = fit(candidate)
-    return None if found is None else settled(found, before)
+    return collected(partial(settled, before=before), collected(partial(from_all_starts, model), bending))
 
 
 def _bends_dynamics(candidate: Candidate) -> bool:
@@ -101,7 +93,7 @@ def refits_of_twins(candidates: Sequence[Candidate], best: FittedCandidate, befo
     """
     twins = [c for c in candidates if c.effect.is_twin_of(best.effect)]
     from_best = partial(refit, best.fit.model.without(best.name), max_iterations=LATER)
-    return collected(partial(_settled, from_best, before), twins)
+    return collected(partial(settled, before=before), collected(from_best, twins))
 
 
 def _anew(candidate: FittedCandidate) -> FittedCandidate:

@@ -70,13 +70,7 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedCandidate(Candidate):
-    """A candidate that was fitted jointly with the whole model.
-
-    Parameters
-    ----------
-    fit : Fit
-        The joint refit.
-    """
+    """A candidate that was fitted jointly with the whole model."""
 
     fit: Fit
 
@@ -116,14 +110,16 @@ def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
 
 def score_model(model: Model, training_data: TrainingData, known: Linearised | None = None) -> Score:
     """Score of a fitted model on records left out; `known` is what `linearised` would find, if a fit has found it."""
-    return _score(training_data, *_system(model, linearised(model, training_data, known)))
+    at = linearised(model, training_data, known)
+    return _score(model, at.names, training_data, at.grams, directions(model, at.names))
 
 
 def score_baseline(fit: Fit, training_data: TrainingData) -> tuple[TrainingData, Score]:
     """The training data and the score. A record that alone determines a parameter of the model is never left out."""
-    products, columns, room = _system(fit.model, linearised(fit.model, training_data, fit.linearised))
-    training_data = replace(training_data, alone=indispensable(products, training_data.floors, columns))
-    return training_data, _score(training_data, products, columns, room)
+    at = linearised(fit.model, training_data, fit.linearised)
+    alone = indispensable(at.grams, training_data.floors, directions(fit.model, at.names))
+    training_data = replace(training_data, alone=alone)
+    return training_data, score_model(fit.model, training_data, at)
 
 
 def linearised(model: Model, training_data: TrainingData, known: Linearised | None = None) -> Linearised:
@@ -134,12 +130,10 @@ def linearised(model: Model, training_data: TrainingData, known: Linearised | No
     return Linearised(names, grams(model, training_data.records, names, training_data.free_with(model)))
 
 
-def _system(model: Model, at: Linearised) -> tuple[Sequence[Gram], Array, tuple[Array, Array]]:
-    columns = directions(model, at.names)
-    return at.grams, columns, room_of(model, at.names, columns)
-
-
-def _score(training_data: TrainingData, products: Sequence[Gram], columns: Array, room: tuple[Array, Array]) -> Score:
+def _score(
+    model: Model, names: Sequence[str], training_data: TrainingData, products: Sequence[Gram], columns: Array
+) -> Score:
+    room = room_of(model, names, columns)
     return cross_validate(products, training_data.floors, columns, training_data.alone, room)
 
 
@@ -229,6 +223,5 @@ def _scored(
     for effect, size in sizes:
         part = columns[:, [*range(kept), *range(first, first + size)]]
         first += size
-        score = _score(training_data, products, part, room_of(model, names, part))
-        found.append(Candidate(effect, training_data, score))
+        found.append(Candidate(effect, training_data, _score(model, names, training_data, products, part)))
     return found

@@ -16,31 +16,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from functools import reduce
 
 import numpy as np
 
-from ...effects import (
-    MEMORY,
-    Creep,
-    CreepTwoRates,
-    EvenInputPolynomial,
-    ExtraResonance,
-    ThermalDrift,
-)
+from ...effects import MEMORY, Creep, CreepTwoRates, EvenInputPolynomial, ExtraResonance, ThermalDrift
 from ...errors import PiezoError
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit
 from ...identification.identification import Identification
 from ...identification.steps.remaining_lag import AMPLIFIERS
 from ...identification.structure.left_out import score_left_out
-from ...identification.structure.piece_fit import fit_pieces
 from ...identification.structure.pieces import pieces_of
 from ...identification.structure.pole_place import with_pole_behind
 from ...identification.structure.structure_choice import LEADS
-from ...identification.structure.structure_fit import free_numbers
+from ...identification.structure.structure_fit import fit_structure
 from ...identification.structure.uncertainty import as_fit
 from ...model.model import Model
 from ...record import Record
@@ -68,7 +60,6 @@ FEW = 8
 
 def structure_steps(
     found: Identification,
-    leads: Mapping[str, float],
     before: Score,
     training_data: TrainingData,
     records: Sequence[Record],
@@ -77,14 +68,13 @@ def structure_steps(
 ) -> list[Step]:
     """One accepted step for every effect of the chosen structure that cross-validation clearly requires, largest first.
 
-    `leads` is the lead of every effect in cross-validation, mean ln R². A level dependence of plays is certain only if
-    the plays are: the operator may need no such term. `before` is the score of the published model; `floors` [m]
-    belongs to `records`, and the indices `fitted` count in them.
+    A level dependence of plays is certain only if the plays are: the operator may need no such term. `before` is the
+    score of the published model; `floors` [m] belongs to `records`, and the indices `fitted` count in them.
     """
 
     def refitted(model: Model) -> Fit:
         pieces = pieces_of(records, fitted)
-        by_pieces = fit_pieces(model, pieces, floors, free_numbers(model), FEW)
+        by_pieces = fit_structure(model, pieces, floors, max_iterations=FEW)
         return as_fit(by_pieces, pieces, floors, np.zeros((len(by_pieces.names),) * 2))
 
     def candidate(name: str, fit: Fit) -> FittedCandidate:
@@ -99,6 +89,7 @@ def structure_steps(
         scores = [score_left_out(model, records, floors, fitted) for model in (drift.model, found.model)]
         return () if scores[0] - scores[1] >= LEADS else (candidate(ThermalDrift.name, drift),)
 
+    leads = found.structure.leads if found.structure is not None else {}
     certain = [n for n in ORDER if leads.get(n, 0.0) >= LEADS and n in found.model]
     names = [n for n in certain if n != MEMORY.level_term.name or MEMORY.name in certain]
     steps: list[Step] = []

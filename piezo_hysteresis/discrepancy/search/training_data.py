@@ -26,8 +26,10 @@ from ...blocks.block import Array
 from ...effects.extent import Extent
 from ...identification.fit.normal_equations import Nuisance
 from ...identification.free_run_error import free_per_record
+from ...identification.records.conditioning import with_conditioning
 from ...identification.records.excitation_check import moves
 from ...identification.records.excitation_content import excitation_content
+from ...identification.records.leading_step import step_length
 from ...model.model import Model
 from ...record import Record
 
@@ -39,6 +41,10 @@ MOST_PEAKS = 3
 """Largest number of peaks in the residual from which a resonance starts."""
 MOVES = 30.0
 """Power over noise from which the spectrum of the displacement counts as motion."""
+BLOCKS = 16
+"""Approximate number of blocks into which the records are cut."""
+FEWEST = 256
+"""Smallest number of samples in a block."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,19 +139,39 @@ def peaks_of(records: Sequence[Record], left: Sequence[Array]) -> tuple[float, .
     return tuple(float(frequency[k]) for k in tops[np.argsort(-ratio[tops])][:MOST_PEAKS])
 
 
+def training_data_of(
+    records: Sequence[Record], fitted: Collection[int], noise: Array, least: Array, model: Model
+) -> TrainingData:
+    """The blocks of the records `fitted`, a leading jump apart, with a zero in each of several records.
+
+    `noise` and `least` are noise and floor of every record [m], shape (r,). Records that only set the state stay whole
+    and have an infinite floor; others are left out. The ranges are in the units of `model`.
+    """
+    length = max(FEWEST, sum(records[i].size for i in fitted) // BLOCKS)
+    blocks, jumps = list[tuple[Record, float, float]](), list[int]()
+    for index in with_conditioning(records, fitted):
+        record = records[index]
+        if index not in fitted:
+            blocks.append((record, np.inf, np.inf))
+            continue
+        step = 0 if record.continues else step_length(record)
+        if step:
+            jumps.append(len(blocks))
+        count = max(1, round((record.size - step) / length))
+        edges = {step, *(step + round(k * (record.size - step) / count) for k in range(1, count))}
+        blocks += [(block, least[index], noise[index]) for block in record.split(*sorted(edges - {0}))]
+    cut, weights, quiet = zip(*blocks, strict=True)
+    extent = Extent.of([records[i] for i in fitted], model.voltage_scale, model.displacement_scale)
+    several = sum(not r.continues for r in records) > 1
+    return TrainingData(cut, np.array(weights), extent, tuple(jumps), noise=np.array(quiet), offset=several)
+
+
 def choose_test_records(records: Sequence[Record], usable: Collection[int]) -> tuple[int, ...]:
-    """Indices of the test records.
+    """Indices of the test records, of those that are `usable`.
 
     If a kind of phase has at least three realisations, one in three is a test record, from the middle of the list, so
     that the extremes of amplitude and frequency are fitted. All phases named ``validation`` are test records, unless
     the drive moves in no other record.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        The experiment.
-    usable : collection of int
-        Indices that may be taken.
     """
     kinds: dict[str, list[int]] = {}
     for index in usable:
