@@ -53,10 +53,8 @@ def run(args: argparse.Namespace) -> int:
 def listing() -> Table:
     """One line for every effect, in the order in which they act."""
     listed = [effect for effect in CHAIN if effect not in UNNAMED]
-    names = Column("effect", min_width=max(len(effect.name) for effect in listed))  # one types them
-    table = Table(
-        names, "family", "place", "how it shows in the residual", title="Catalogue of effects, in chain order"
-    )
+    names, last = Column("effect", no_wrap=True), Column("how it shows in the residual", overflow="fold")
+    table = Table(names, "family", "place", last, title="Catalogue of effects, in chain order")  # names are typed
     for effect in listed:
         name = f"[dim]{effect.name}[/dim]" if effect in BASELINE else f"[bold]{effect.name}[/bold]"
         table.add_row(name, effect.family, effect.place.name.lower(), effect.signature)

@@ -126,9 +126,13 @@ def _turn(
             message = f"in cross-validation its mean ln R² is {lead:.2f} ± {error:.2f} higher than with {best.name}"
             rejected.append(Rejection(candidate.name, message))
     others = [c for c in screened if all(c.name != r.name for r in refits)]
+    gain = before.cost - best.score.cost
     for other in others:
         most = max(0.0, before.cost - other.score.cost)
-        rejected.append(Rejection(other.name, f"in cross-validation it lowers mean ln R² by at most {most:.2f}"))
+        message = (
+            f"it is predicted to lower mean ln R² by at most {most:.2f}, where {best.name} lowers it by {gain:.2f}"
+        )
+        rejected.append(Rejection(other.name, message))
     return Step(before, best, accepted, tuple(rivals), tuple(rejected), (*refits, *others))
 
 

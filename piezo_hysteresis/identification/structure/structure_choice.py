@@ -150,7 +150,10 @@ def choose_structure(
         leads = {**linear.leads, **_leads_of_operator(start, full, chosen, pieces, sizes)}
         fit = as_fit(rival, pieces, sizes, nothing, linear.open_lag)
         return StructureChoice(fit, tuple(judged), leads, tuple(notices))
-    notices.append(Notice("memory", f"{MEMORY.name} is used: the stage remembers its turning points"))
+    message = f"{MEMORY.name} is used: the stage remembers its turning points"
+    if not final.model[MEMORY.name].array("c").any():
+        message = "no hysteresis was found: the weights of all plays are 0"
+    notices.append(Notice("memory", message))
     spread = spread_of(full, final, chosen, judged)
     leads = {MEMORY.name: -lead, **linear.leads, **_leads(chosen, judged)}
     fit = as_fit(final, pieces, sizes, spread, linear.open_lag)

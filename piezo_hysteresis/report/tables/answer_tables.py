@@ -37,7 +37,7 @@ def effect_table(answer: Mapping[str, Any]) -> Table | None:
         rows += [(effect["name"], effect["family"], share, twins, *cells) for cells in _cells(effect["parameters"])]
     header = ("effect", "family", "share of the gap", "confusable with", "parameter", "value", "95 %")
     several = len({row[0] for row in rows}) > 1
-    note = "The share is the decrease of the RMS error above the noise floor, in the records of the gap." + (
+    note = "The share is the decrease of the error above the noise floor, of which the squares are subtracted." + (
         " It is that of all these effects together." if several else ""
     )
     return Table("Effects found", header, tuple(rows), note, frozenset({2, 5, 6})) if rows else None

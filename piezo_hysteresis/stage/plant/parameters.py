@@ -142,9 +142,9 @@ class PlantParameters:
             part, _, quantity = name.partition(".")
             known = {row.name for row in _GROUPS[part].table()} if part in _GROUPS else set()
             if quantity not in known:
-                expected = (
-                    f"one of {', '.join(sorted(known))}" if known else f"part.quantity, part: {', '.join(_GROUPS)}"
-                )
+                expected = f"part.quantity, part: {', '.join(_GROUPS)}"
+                if known:
+                    expected = f"one of {', '.join(f'{part}.{name}' for name in sorted(known))}"
                 raise ParameterError(f"{name!r}: unknown quantity of the simulated stage, expected {expected}")
             changes.setdefault(part, {})[quantity] = value
         parts = {part: replace(getattr(self, part), **new) for part, new in changes.items()}

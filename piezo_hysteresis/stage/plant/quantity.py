@@ -43,7 +43,7 @@ class Group:
 
     def __post_init__(self) -> None:
         for row in self.table():
-            value = row.check(getattr(self, row.name), f"{type(self).__name__.lower()}.")
+            value = row.check(getattr(self, row.name), f"{self._part()}.")
             if isinstance(row.value, float) and isinstance(self._default(row.name), int):
                 value = self._whole(row.name, value)
             object.__setattr__(self, row.name, value)
@@ -59,11 +59,16 @@ class Group:
         return tuple(rows)
 
     @classmethod
+    def _part(cls) -> str:
+        """Name of this part in a plant file."""
+        return cls.__name__.removeprefix("Plant").lower()
+
+    @classmethod
     def _default(cls, name: str) -> object:
         return next(f.default for f in fields(cls) if f.name == name)
 
     @classmethod
     def _whole(cls, name: str, value: Any) -> int:
         if value != int(value):
-            raise ParameterError(f"{cls.__name__.lower()}.{name}: got {value:g}, expected a whole number")
+            raise ParameterError(f"{cls._part()}.{name}: got {value:g}, expected a whole number")
         return int(value)

@@ -64,5 +64,7 @@ def test_the_catalogue_fits_a_narrow_terminal_and_names_stay_whole() -> None:
     text = output.getvalue()
     assert max(map(cell_len, text.splitlines())) <= 80
     assert "…" not in text
+    last = "".join(line.split("│")[4] for line in text.splitlines() if line.count("│") == 5).replace(" ", "")
     for effect in CHAIN:
         assert effect in UNNAMED or f" {effect.name} " in text
+        assert effect in UNNAMED or "".join(effect.signature.split()) in last, "nothing is cut off"
