@@ -82,9 +82,10 @@ def waveform_from_cloud(cloud: PointCloud2, sample_period: float) -> Samples:
     arrays = from_cloud(cloud, {"voltage": "f8"}, {"time": "f8"})
     time, voltage = arrays.get("time"), arrays["voltage"]
     if time is not None:
-        off = np.abs(time - time[0] - sample_period * np.arange(time.size))
+        with np.errstate(over="ignore"):  # infinite is too far off, too
+            off = np.abs(time - time[0] - sample_period * np.arange(time.size))
         if off.max() > PERIOD_TOLERANCE * sample_period:
-            got = float(time[-1] - time[0]) / (time.size - 1)
+            got = (float(time[-1]) - float(time[0])) / (time.size - 1)
             raise RecordError(
                 f"time: got a period of {got:g} s ({off.max():.3g} s off at worst), expected {sample_period:g} s"
             )

@@ -24,6 +24,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 
 from piezo_hysteresis.errors import RecordError
 from piezo_hysteresis.nodes.messages import conversions
+from piezo_hysteresis.nodes.messages.cloud import to_cloud
 from piezo_hysteresis.nodes.messages.phase_text import phase_from_text, phase_name, phase_text
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -62,6 +63,14 @@ def test_a_waveform_is_converted_and_back_bit_for_bit(voltage):
 )
 def test_a_phase_is_named_by_a_field_or_by_frame_id(fields, frame_id, name):
     assert phase_text(fields, frame_id, "stage_x") == name
+
+
+@pytest.mark.parametrize("last", [1e308, -1e308])
+def test_impossible_times_are_refused_without_a_warning(last):
+    columns = {"voltage": np.zeros(2), "time": np.array([-last, last])}
+    message = over_the_wire(to_cloud(columns, {"voltage": "f8", "time": "f8"}, conversions.to_stamp(0), ""))
+    with pytest.raises(RecordError, match="time: got a period"):
+        conversions.waveform_from_cloud(message, 2e-5)
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.001, 2.0])
