@@ -92,7 +92,7 @@ class Record(Pictured):
         if not (np.isfinite(period) and period > 0):
             raise RecordError(f"sample_period: got {self.sample_period!r} s, expected a positive time")
         put(self, "sample_period", period)
-        put(self, "phase", printable(self.phase))
+        put(self, "phase", printable(self.phase) or "record")
         for name in ("start_time", "initial_voltage"):
             if (number := getattr(self, name)) is not None and not np.isfinite(number):
                 raise RecordError(f"{name}: got {number!r}, expected a finite number")

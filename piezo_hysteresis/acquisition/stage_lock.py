@@ -32,6 +32,8 @@ FOLDERS = (Path("/run/lock"), Path("/tmp"))
 """Possible folders for locks; the first one in which every user may write is used."""
 
 
+_OWN = set[Path]()
+"""Files of the locks that this process holds."""
 KEEPER_TIME = 10.0
 """Longest wait for the keeper of a driver that has ended [s]."""
 
@@ -51,7 +53,7 @@ class StageLock:
     """
 
     def __init__(self, holds: Iterable[str]) -> None:
-        self._files: list[TextIO] = []
+        self._files: dict[Path, TextIO] = {}
         for what in holds:
             try:
                 self.add(what)
@@ -61,17 +63,20 @@ class StageLock:
 
     def add(self, what: str) -> None:
         """Add a lock; raises StageError if another process holds it."""
-        self._files.append(_lock(what))
+        path = _folder() / f"piezo_hysteresis_{hashlib.sha256(what.encode()).hexdigest()[:16]}.lock"
+        self._files[path] = _lock(what, path)
+        _OWN.add(path)
 
     @property
     def descriptors(self) -> list[int]:
         """File descriptors of all locks; a process that inherits them holds the locks, too."""
-        return [file.fileno() for file in self._files]
+        return [file.fileno() for file in self._files.values()]
 
     def release(self) -> None:
         """Release all locks; may be repeated. A keeper that moves the stage still holds its own."""
-        for file in self._files:
+        for path, file in self._files.items():
             file.close()
+            _OWN.discard(path)
         self._files.clear()
 
 
@@ -107,13 +112,19 @@ def _taken(file: TextIO) -> bool:
     return False
 
 
-def _has_ended(process: str) -> bool:
-    """Whether a process has ended that is given by its number; then its keeper still holds the lock."""
-    return process.isdecimal() and not Path(f"/proc/{process}").exists()
+def _is_left(process: str, path: Path) -> bool:
+    """Whether the process with this number has ended, or is this one and has released the lock: its keeper holds it."""
+    if not process.isdecimal():
+        return False
+    if int(process) == os.getpid():
+        return path not in _OWN
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+    except OSError:
+        return True
 
 
-def _lock(what: str) -> TextIO:
-    path = _folder() / f"piezo_hysteresis_{hashlib.sha256(what.encode()).hexdigest()[:16]}.lock"
+def _lock(what: str, path: Path) -> TextIO:
     try:
         descriptor = _opened(path)
     except OSError as error:
@@ -125,13 +136,14 @@ def _lock(what: str) -> TextIO:
     while not _taken(file):
         file.seek(0)
         holder = file.read(20).strip() or "unknown"
-        if _has_ended(holder) and time.monotonic() < end:
+        is_left = _is_left(holder, path)
+        if is_left and time.monotonic() < end:
             time.sleep(0.05)
             continue
         file.close()
         raise StageError(
-            f"{what}: process {holder} has ended, but its keeper still brings the stage to its safe voltage; try again"
-            if _has_ended(holder)
+            f"{what}: the keeper of process {holder} still brings the stage to its safe voltage; try again"
+            if is_left
             else f"{what} is held by process {holder} already; end that one or take another namespace"
         )
     file.seek(0)

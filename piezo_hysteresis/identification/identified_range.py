@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -175,5 +176,13 @@ def _largest_step(record: Record, before: float) -> float:
 
 def _voltages_before(records: Sequence[Record]) -> list[float]:
     """Voltage before the first sample of every record [V]."""
-    ends = [records[0].settled_voltage, *(float(r.voltage[-1]) for r in records[:-1])]
-    return [end if r.continues else r.settled_voltage for r, end in zip(records, ends, strict=True)]
+    found = [records[0].settled_voltage]
+    for before, record in pairwise(records):
+        gap = record.start_time - before.start_time - before.duration
+        if not record.continues:
+            found.append(record.settled_voltage)
+        elif record.truncated or gap > 1.5 * before.sample_period:  # the drive has moved in samples that are lost
+            found.append(float(record.voltage[0]))
+        else:
+            found.append(float(before.voltage[-1]))
+    return found

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import lzma
 import tokenize
 import zipfile
@@ -26,9 +27,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, RecordingError
+from ..home_path import in_home
+from ..yaml_file import read_regular_file
 from .axes_model import AxesModel
 
+_LARGEST = 1 << 30
+"""Largest size of a model file [bytes]."""
 _NAMES = tuple(f.name for f in fields(AxesModel) if f.init)
 """Keys of the file."""
 
@@ -53,7 +58,7 @@ def save(model: AxesModel, path: str | Path) -> Path:
     ModelError
         If the name does not end in ``.npz`` or the file cannot be written.
     """
-    path = Path(path).expanduser()
+    path = in_home(path)
     if path.suffix != ".npz":
         raise ModelError(f"{path}: a model of several axes is an NPZ file; give it a name that ends in .npz")
     draft = path.with_name(path.stem + ".tmp.npz")
@@ -74,18 +79,21 @@ def load(path: str | Path) -> AxesModel:
     ModelError
         If there is no such file, or it is not a model of several axes.
     """
-    path = Path(path).expanduser()
+    path = in_home(path)
     expected = "expected a model of several axes, as piezo identify writes it"
     try:
-        with path.open("rb") as file, zipfile.ZipFile(file):  # np.load takes other files for pickled objects
+        raw = io.BytesIO(read_regular_file(path, _LARGEST))
+        with zipfile.ZipFile(raw):  # np.load takes other files for pickled objects
             pass
-        with np.load(path, allow_pickle=False) as file:
+        with np.load(raw, allow_pickle=False) as file:
             if missing := [name for name in _NAMES if name not in file and name not in _OPTIONAL]:
                 raise ModelError(f"got an NPZ file without '{missing[0]}', {expected}")
             values = {name: file[name] for name in _NAMES if name in file}
         model = AxesModel(**values | {name: float(value) for name, value in values.items() if name in _NUMBERS})
     except OSError as error:
         raise ModelError(f"{path}: {error.strerror or error}, {expected}") from None
+    except RecordingError as error:
+        raise ModelError(f"{path}: {error}, {expected}") from None
     except zipfile.BadZipFile:
         raise ModelError(f"{path}: got no NPZ file, {expected}") from None
     except ModelError as error:

@@ -136,11 +136,11 @@ def standard_errors(model: Model, records: Iterable[Record]) -> list[Array]:
     return found
 
 
-def after_hold(model: Model, state: ChainState, voltage: float, samples: int) -> ChainState:
-    """State after many samples at one voltage [V], in a few long steps: the dynamics have settled long before."""
-    chain, steps = model.at(state.sample_period), min(samples, HOLD_STEPS)
-    slow = model.at(samples / steps * state.sample_period)
-    return chain.resume(slow.run(np.full(steps, voltage), slow.resume(state))[1])
+def after_hold(model: Model, state: ChainState, voltage: float, duration: float) -> ChainState:
+    """State after a long time [s] at one voltage [V], in a few long steps: the dynamics have settled long before."""
+    steps = min(max(1, round(duration / state.sample_period)), HOLD_STEPS)
+    slow = model.at(max(duration / steps, state.sample_period))
+    return model.at(state.sample_period).resume(slow.run(np.full(steps, voltage), slow.resume(state))[1])
 
 
 def _with_holds(records: Iterable[Record]) -> Iterator[tuple[int | None, Record]]:

@@ -26,6 +26,7 @@ from pathlib import Path
 import yaml
 
 from ..errors import ModelError, RecordingError
+from ..home_path import in_home
 from ..yaml_file import read_regular_file
 from .model import Model
 from .model_parameters import COVARIANCE, PREFIX, SCALES, from_parameters, to_parameters
@@ -141,7 +142,7 @@ def save(model: Model, path: str | Path) -> Path:
     ModelError
         If the name ends in ``.npz`` or the file cannot be written.
     """
-    path = Path(path).expanduser()
+    path = in_home(path)
     require_name(path)
     text = dumps(model)
     draft = path.with_name(path.name + ".tmp")
@@ -164,7 +165,7 @@ def load(path: str | Path) -> Model:
     ModelError, ParameterError
         If there is no such file, if it is a folder, a pipe or a device, or as `loads`.
     """
-    path = Path(path).expanduser()
+    path = in_home(path)
     try:
         raw = read_regular_file(path, _LONGEST_CHARACTER * (LONGEST_TEXT + 1))
         if raw.startswith(_ARCHIVE):

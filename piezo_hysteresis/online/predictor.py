@@ -218,10 +218,10 @@ class Predictor:
             self._history.mark_unknown()
         gap = min(missing, round(LONGEST_SILENCE / self.sample_period), FULL_SAMPLES)
         self._run(np.full(gap, self._history.last))
-        if missing > gap:
-            self._history.hold(missing - gap)
+        if rest := missing - gap:
+            self._history.hold(rest)
             if self.model is not None and self.state is not None:
-                self.state = after_hold(self.model, self.state, self._history.last, missing - gap)
+                self.state = after_hold(self.model, self.state, self._history.last, rest * self.sample_period)
 
     def _run(self, drive: Array) -> Array | None:
         self._history.append(drive)

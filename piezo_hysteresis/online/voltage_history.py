@@ -110,6 +110,7 @@ class VoltageHistory:
         self._full = np.empty(self.factor)
         self._kept = 0
         self._slow = np.empty(0)
+        self._holds: list[tuple[int, int]] = []
 
     @property
     def start(self) -> int:
@@ -153,20 +154,16 @@ class VoltageHistory:
             self._average()
 
     def hold(self, samples: int) -> None:
-        """Add many samples at the newest voltage; only averages of those before them are kept."""
-        last = self.last
-        if samples < 2 * self.factor:
-            self.append(np.full(samples, last))
-            return
-        self.count += samples
-        if not self._has_moved:
-            return
-        before = np.append(self._full[: self._kept], np.full(-self._kept % self.factor, last))
-        held, rest = divmod(samples + self._kept - before.size, self.factor)
-        means = before.reshape(-1, self.factor).mean(axis=1)
-        self._keep_slow(np.concatenate((means, np.full(min(held - 1, 2 * self._slow_limit), last))))
-        self._kept = self.factor + rest
-        self._full = np.full(self._kept, last)
+        """Note many further samples at the newest voltage, which are not kept and have no position."""
+        self._holds.append((self.count, samples))
+
+    def held_until(self, position: int) -> int:
+        """Number of samples of every `hold` up to a position."""
+        return sum(samples for at, samples in self._holds if at <= position)
+
+    def next_hold(self, position: int) -> int:
+        """Position of the next `hold`; the end of the stream if there is none."""
+        return min((at for at, _ in self._holds if at > position), default=self.count)
 
     def read(self, position: int, values: int) -> tuple[int, Array]:
         """The voltages of the stream from sample `position` on.
@@ -196,9 +193,8 @@ class VoltageHistory:
         """A frozen copy of the history as it is now."""
         period = self.sample_period
         full = self._full[: self._kept].copy()
-        return DriveHistory(
-            self.rest_voltage, self.start * period, self.factor * period, period, self._slow.copy(), full
-        )
+        start_time = (self.start + self.held_until(self.count)) * period  # the newest samples have their true time
+        return DriveHistory(self.rest_voltage, start_time, self.factor * period, period, self._slow.copy(), full)
 
     @property
     def _full_start(self) -> int:
@@ -212,16 +208,13 @@ class VoltageHistory:
 
     def _average(self) -> None:
         old = (self._kept - self._limit) // self.factor * self.factor
-        self._keep_slow(self._full[:old].reshape(-1, self.factor).mean(axis=1))
-        self._full[: self._kept - old] = self._full[old : self._kept].copy()
-        self._kept -= old
-
-    def _keep_slow(self, means: Array) -> None:
-        """Add averages, and remove the oldest ones if they are too many."""
+        means = self._full[:old].reshape(-1, self.factor).mean(axis=1)
         self._slow = np.concatenate((self._slow, means))
         if self._slow.size > 1.5 * self._slow_limit:
             self.rest_voltage = float(self._slow[-self._slow_limit - 1])
             self._slow = self._slow[-self._slow_limit :]
+        self._full[: self._kept - old] = self._full[old : self._kept].copy()
+        self._kept -= old
 
 
 def is_held(voltage: Array, tolerance: float = REST_TOLERANCE * USUAL_SCALE) -> bool:

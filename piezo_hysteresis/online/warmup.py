@@ -26,6 +26,7 @@ from ..blocks.kernel import on_compilation
 from ..effects import BY_NAME, CHAIN
 from ..errors import PiezoError
 from ..model.chain import ChainState
+from ..model.free_run import after_hold
 from ..model.model import Model
 from .sensor_offset import SensorOffset
 from .voltage_history import VoltageHistory
@@ -66,7 +67,8 @@ class Warmup:
         self._running = self._slow
         self._sum, self._weight = 0.0, 0
         rest = history.rest_voltage
-        time = history.start * history.sample_period
+        self._held = history.held_until(history.start)
+        time = (history.start + self._held) * history.sample_period
         self.state: ChainState = self._slow.rest(rest, time, since=0.0)
         if zero.start < history.start:
             settled, _ = self._slow.run(np.array([rest]), self.state)
@@ -101,8 +103,12 @@ class Warmup:
             chain = self._slow if factor > 1 else self.chain
             if chain is not self._running:
                 self.state, self._running = chain.resume(self.state), chain
+            if (held := self._history.held_until(self._position)) > self._held:
+                duration = (held - self._held) * self._history.sample_period
+                self.state, self._held = after_hold(self.model, self.state, self.state.inputs[0], duration), held
             if voltage.size == 0:
                 return True
+            voltage = voltage[: max(1, (self._history.next_hold(self._position) - self._position) // factor)]
             y, self.state = chain.run(voltage, self.state)
             self._add(y, self._position, factor)
             self._position += factor * voltage.size

@@ -79,9 +79,22 @@ def test_a_process_that_inherits_a_lock_holds_it_until_it_ends(tmp_path):
         assert holder.stdout.readline() == b"held\n"
         time.sleep(0.2)
         holder.kill()
+        time.sleep(0.2)
+        begin = time.monotonic()
+        StageLock(["device A"]).release()  # also before somebody has asked how the process ended
+        assert time.monotonic() - begin > 0.3, "it waits for the process that is left"
+
+
+def test_a_lock_that_was_released_is_waited_for_where_a_keeper_still_holds_it():
+    first = StageLock(["device A"])
+    keeper = subprocess.Popen(["sleep", "1.0"], pass_fds=first.descriptors)
+    with pytest.raises(StageError, match="is held by process"):
+        StageLock(["device A"])
+    first.release()
     begin = time.monotonic()
     StageLock(["device A"]).release()
-    assert time.monotonic() - begin > 0.3, "it waits for the process that is left"
+    assert time.monotonic() - begin > 0.3
+    keeper.wait()
 
 
 def test_a_damaged_lock_is_refused_in_one_line(tmp_path):

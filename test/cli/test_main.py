@@ -136,6 +136,8 @@ def files(tmp_path_factory, folder):
         ("validate {fine} {experiment} --rows 5", "expected FROM:TO"),
         ("validate {fine} {experiment} --sample-period -1", "expected a positive time"),
         ("validate {fine} {experiment} --phase 0=a --phase b", "TIME=NAME"),
+        ("identify {experiment} -o {place}/x.yaml --json {place}/x.yaml", "expected another file"),
+        ("identify {experiment} -o {place}/x.yaml --taps 7", "--taps: got 7 for a stage of one axis"),
         ("report {experiment} --answer {fine}", "no JSON"),
         ("report {experiment} --answer {list}", "got a list"),
         ("report {experiment} --model before={place}/none.yaml", "expected a model file"),

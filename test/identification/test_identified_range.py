@@ -106,6 +106,15 @@ def test_a_step_between_two_records_and_in_a_stream_is_reported():
     assert any("the drive changes by 3000 V/s" in n.message for n in watch.findings())
 
 
+@pytest.mark.parametrize("options", [{"truncated": True}, {"start_time": 4.1}])
+def test_what_the_drive_did_in_lost_samples_is_no_step(options):
+    """It was said to be one between two samples, and the model stated it as the steepest that it knows."""
+    rest = held(3.0, before=3.0)
+    after = Record(np.full(2000, 6.0), np.full(2000, 6e-6), 1e-3, "later", continues=True, **options)
+    assert outside(known_from(sine(4.0, 10.0)), Experiment((rest, after))) == ()
+    assert float(identified_range((rest, after), (0, 1))["step_rate_max"]) == 0.0
+
+
 def test_a_rest_in_which_the_drive_hardly_moves_shows_no_frequency():
     drive = 3.0 * (1.0 - np.cos(2.0 * np.pi * TIME))
     rest, sine_1hz = Record(drive, 1e-6 * drive, 1e-3, "rest").split(40)

@@ -255,6 +255,30 @@ def test_a_long_hold_is_predicted_as_the_simulation_of_it(seconds: float) -> Non
     assert again.prediction.size == 500
 
 
+@pytest.mark.parametrize(("frequency", "seconds"), [(40.0, 100.0), (1.0, 8000.0)])
+def test_a_model_that_is_changed_after_a_long_hold_knows_the_turns_before_it(frequency: float, seconds: float) -> None:
+    """Averages of the drive lose the turns of a fast one, and a night of hold must not displace what was before it."""
+    period, count = 1e-3, 4000
+    time = period * np.arange(count)
+    drive = 2.0 - 2.0 * np.cos(2.0 * np.pi * frequency * np.maximum(time - 0.02, 0.0))
+    drive[2700:] = np.interp(np.arange(1300), [0, 300], [drive[2700], 2.0])
+    tail = 2.0 + 0.3 * np.sin(2.0 * np.pi * 2.0 * period * np.arange(6000))
+    model = Model((BoucWen(), Arx(a=[-0.7], b=[0.15], delay=1.0)), period)
+    both = truth(model, np.concatenate((drive, np.full(1000, drive[-1]), tail)))
+    before, after = both[:count], both[count + 1000 :]
+    predictor = Predictor(period, model)
+    feed(predictor, drive, before)
+    begin = count + round(seconds / period)
+    predictor.predict(begin, begin * 10**6, tail[:100], after[:100], follows_gap=True)
+    predictor.swap(replace(model), predictor.offset)
+    answers = [
+        predictor.predict(begin + k, (begin + k) * 10**6, tail[k : k + 100], after[k : k + 100])
+        for k in range(100, 6000, 100)
+    ]
+    assert not predictor.is_swapping and not predictor.warming_up
+    assert np.abs(residual(answers[-20:])).max() < 1e-6 * np.ptp(both)
+
+
 def test_invalid_options_are_refused() -> None:
     for wrong in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(ParameterError, match="rms_time: got"):

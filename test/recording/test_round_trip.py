@@ -59,6 +59,30 @@ def experiments(draw, periods=periods, names=names, shortest=1):
     return Experiment(tuple(records))
 
 
+@pytest.mark.parametrize("ending", [".csv", ".mat", ""])
+def test_a_part_that_begins_in_motion_is_not_taken_for_one_at_rest(tmp_path, ending):
+    """Tables lost that it continues something, and its state was taken for known."""
+    drive = np.sin(np.arange(500) / 20.0)
+    part = Experiment((Record(drive, 1e-6 * drive, 1e-3, "sine", start_time=2.0, continues=True),))
+    write(part, tmp_path / f"part{ending}")
+    (found,) = read(tmp_path / f"part{ending}")
+    assert found.truncated
+    assert not found.continues
+
+
+@pytest.mark.parametrize("ending", [".csv", ".mat", ""])
+def test_phases_with_any_name_are_read_back(tmp_path, ending):
+    """A last phase whose name is a number made the rows of the others text above the table."""
+    drive = np.sin(np.arange(300) / 20.0)
+    names, sent = ("sine", "50", ""), []
+    for k, name in enumerate(names):
+        sent.append(Record(drive, 1e-6 * drive, 1e-3, name, start_time=10.0 * k))
+    write(Experiment(tuple(sent)), tmp_path / f"e{ending}")
+    got = read(tmp_path / f"e{ending}")
+    assert [r.phase for r in got] == ["sine", "50", "record"]
+    assert [r.size for r in got] == [300, 300, 300]
+
+
 def assert_same(got, sent, but=()):
     assert len(got) == len(sent)
     for a, b in zip(got, sent, strict=True):

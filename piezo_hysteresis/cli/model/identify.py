@@ -20,6 +20,7 @@ import argparse
 from typing import Any
 
 from ...effects import HYSTERESIS, MEMORY, OPERATORS, PublishedBoucWen
+from ...errors import ParameterError
 from ...identification.identification import Identification, undetermined
 from ...identification.identify import identify
 from ...identification.records.roles import HELD_OUT
@@ -42,10 +43,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser("identify", description=__doc__)
     reading_options.add_arguments(parser)
     parser.add_argument("-o", "--output", metavar="FILE", default="model.yaml", help="model file (default: model.yaml)")
-    parser.add_argument(
+    orders = parser.add_mutually_exclusive_group()
+    orders.add_argument(
         "--orders", metavar=("NA", "NB"), nargs=2, type=int, help="orders of the ARX model (default: 8 8, as published)"
     )
-    parser.add_argument("--choose-orders", action="store_true", help="choose the lowest orders with a good prediction")
+    orders.add_argument("--choose-orders", action="store_true", help="choose the lowest orders with a good prediction")
     parser.add_argument(
         "--taps", metavar="N", type=int, help="several axes: length of every impulse response [samples] (default: 250)"
     )
@@ -86,6 +88,8 @@ def run(args: argparse.Namespace) -> int:
     experiment = reading_options.read(args)
     if has_several_axes(experiment):
         return several_axes.identify(experiment, args)
+    if args.taps is not None:
+        raise ParameterError(f"--taps: got {args.taps} for a stage of one axis, expected several axes or no --taps")
     model_file.require_name(args.output)
     orders = None if args.choose_orders else tuple(args.orders or (8, 8))
     with progress("identify", usual_time(experiment.size, "2 s", 1)) as report_progress:

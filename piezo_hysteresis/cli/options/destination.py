@@ -57,10 +57,14 @@ def require_new_results(args: argparse.Namespace) -> None:
     Raises
     ------
     RecordingError
-        As `require_new_file` and `require_new_folder`.
+        As `require_new_file` and `require_new_folder`; and for one file given twice.
     """
+    taken: dict[Path, str] = {}
     for option, name in (("-o", "output"), ("--report", "report"), ("--json", "json")):
-        require_new_file(option, getattr(args, name, None), args.force)
+        path = getattr(args, name, None)
+        require_new_file(option, path, args.force)
+        if path is not None and (other := taken.setdefault(Path(path).expanduser().absolute(), option)) != option:
+            raise RecordingError(f"{option}: got {path} as for {other}, expected another file")
     require_new_folder("--figures", getattr(args, "figures", None), args.force)
 
 

@@ -87,11 +87,12 @@ class SetPoint:
             return
         why = driver.missing and f"no driver: waiting for {driver.missing}"
         why = why or driver.blocked
-        if self._has_arrived:
+        distance = driver.distance(self._voltage)
+        if self._has_arrived or distance <= 1.0:
             driver.refused_voltage = ""  # that of another client
         elif driver.refused_voltage:
             why = why or f"the driver refused: {driver.refused_voltage}"
-        if not why and self.has_left(driver.distance(self._voltage), elapsed):
+        if not why and self.has_left(distance, elapsed):
             why = driver.misplaced(self._voltage)
         if why:
             self.leave()

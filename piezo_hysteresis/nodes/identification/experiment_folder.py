@@ -19,7 +19,10 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from pathlib import Path
 
-from ...errors import ParameterError
+from ...errors import ParameterError, PiezoError
+from ...home_path import in_home
+from ...model.model import Model
+from ...model.model_file import save
 
 
 class ExperimentFolder:
@@ -39,7 +42,7 @@ class ExperimentFolder:
     """
 
     def __init__(self, root: str, namespace: str) -> None:
-        self.root = Path(root or Path("~/.ros/piezo_hysteresis") / namespace.strip("/")).expanduser()
+        self.root = in_home(root or Path("~/.ros/piezo_hysteresis") / namespace.strip("/"))
         self.last: Path | None = None
 
     def new(self) -> Path:
@@ -49,7 +52,7 @@ class ExperimentFolder:
     def chosen(self, given: str) -> Path | None:
         """The recording at this path. An empty path gives the last recording, or None if there is none."""
         if given or self.last is not None:
-            return Path(given).expanduser() if given else self.last
+            return in_home(given) if given else self.last
         recorded = sorted(path.parent for path in self.root.glob("*/metadata.yaml"))
         return recorded[-1] if recorded else None
 
@@ -61,6 +64,15 @@ class ExperimentFolder:
         ParameterError
             If there is no such recording.
         """
-        root, place = self.root.resolve(), Path(given).expanduser().resolve()
+        root, place = self.root.resolve(), in_home(given).resolve()
         if not (place.is_relative_to(root) and place.exists()):
             raise ParameterError(f"experiment: got {place}, expected a recording inside {root}")
+
+
+def problem_of_saving(model: Model, path: Path) -> str:
+    """Save a model that is served already; returns what is said if that fails, and nothing otherwise."""
+    try:
+        save(model, path)
+    except PiezoError as error:
+        return f" The model is served, but not kept: {error}"
+    return ""

@@ -31,7 +31,7 @@ from ...errors import PiezoError, reason_of
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.protocol import Protocol
 from ...model.model import Model
-from ...model.model_file import dumps, loads, save
+from ...model.model_file import dumps, loads
 from ...recording.segmentation.decimation import save_decimation
 from ..runtime.fit_process import FitProcess, Job, Outcome
 from ..runtime.guarded_node import GuardedNode
@@ -39,7 +39,7 @@ from ..runtime.job_actions import JobActions, by_service
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
 from .driver_client import DriverClient
-from .experiment_folder import ExperimentFolder
+from .experiment_folder import ExperimentFolder, problem_of_saving
 from .fit_jobs import diagnosis, identification
 from .live_process import LiveSettings
 from .live_protocols import LiveProtocols
@@ -190,7 +190,7 @@ class IdentificationNode(GuardedNode):
         except Exception as error:
             return f"on request; {reason_of(error)}"
         if owned:
-            return "on request; the stage goes to its safe voltage, the recording is readable"
+            return "on request; the driver was asked to go to its safe voltage, the recording is readable"
         ended = "nothing was played" if self._moves else "the fit was ended"
         return f"on request; {ended}, the stage was left as it is"
 
@@ -237,10 +237,10 @@ class IdentificationNode(GuardedNode):
         """Serve, publish and save the model of a job that has ended."""
         found = loads(outcome.model)
         self._served.serve(found)
-        save(found, (path if path.is_dir() else path.parent) / f"{name}.yaml")
+        problem = problem_of_saving(found, (path if path.is_dir() else path.parent) / f"{name}.yaml")
         for line in outcome.summary.splitlines():
             self.get_logger().info(line)
-        self._status.done(outcome.verdict, outcome.conclusion)
+        self._status.done(outcome.verdict + problem, outcome.conclusion)
 
     def _protocol(self, limits: DriveLimits) -> Protocol:
         values = read(self, IDENTIFICATION)

@@ -30,6 +30,7 @@ from std_srvs.srv import Trigger
 
 from ...acquisition.sample_block import SampleBlock
 from ...errors import PiezoError
+from ...home_path import in_home
 from ...model.model import Model
 from ...model.model_parameters import model_hash
 from ...online.change.baseline import Baseline
@@ -99,7 +100,7 @@ class ChangeReporter:
         self._node, self.interval = node, float(values["false_alarm_interval"])
         self._duration = float(values["baseline_time"])
         given = values["baseline_folder"] or Path("~/.ros/piezo_hysteresis") / node.get_namespace().strip("/")
-        self.folder = Path(given).expanduser()
+        self.folder = in_home(given)
         self.watch = ChangeWatch(self.interval)
         self._model: Model | None = None
         self._adopted: tuple[Model, Baseline] | None = None
@@ -149,7 +150,7 @@ class ChangeReporter:
         baseline = None
         try:
             baseline = Baseline.load(path) if path.is_file() else None
-        except PiezoError as error:
+        except (OSError, PiezoError) as error:
             self._report_problem(str(error))
         self.watch, self._alarms = ChangeWatch(self.interval, baseline), 0
 

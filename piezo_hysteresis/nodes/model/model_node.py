@@ -74,7 +74,7 @@ class ModelNode(GuardedNode):
         self._recalibrator = Recalibrator(self, self._changes, self._follow)
         if self._values["model_file"]:
             self._load(self._values["model_file"])
-        let_change(self, MODEL, "model_file", load, self._load)
+        let_change(self, MODEL, "model_file", self._usable, self._load)
         subscribe(self, "model", self._on_model)
         subscribe(self, "samples", self._on_samples, deep=True, raw=True)
         self.create_service(Trigger, "~/zero", self._on_zero)
@@ -141,6 +141,12 @@ class ModelNode(GuardedNode):
     def end(self) -> None:
         """End a running fit."""
         self._recalibrator.end()
+
+    def _usable(self, path: str) -> None:
+        """Raise PiezoError for a file without a model, or with one that is too slow for the stream."""
+        model = load(path)
+        if self._predictor is not None:
+            model.at(self._predictor.sample_period)
 
     def _load(self, path: str) -> None:
         try:

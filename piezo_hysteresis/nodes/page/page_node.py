@@ -84,7 +84,12 @@ class PageNode(GuardedNode):
 
     def call(self, axis: str, service: str) -> Reply[Answer]:
         """Call a service of an axis; from any thread."""
-        return self._feeds[axis].call(service)
+        feed = self._feeds.get(axis)
+        if feed is not None:
+            return feed.call(service)
+        reply: Reply[Answer] = Reply()
+        reply.set_result(Answer(False, f"no axis '{axis}' was found yet; nothing was sent"))
+        return reply
 
     def _follow(self, axis: str) -> None:
         name = "/" + axis.strip("/")

@@ -100,7 +100,10 @@ class JobProcess(Generic[Message]):
     def close(self) -> None:
         """End the job, finished or not."""
         self._process.terminate()
-        self._process.join()
+        self._process.join(1.0)
+        if self._process.is_alive():  # a suspended process does not hear SIGTERM
+            self._process.kill()
+            self._process.join()
         self._connection.close()
 
     def _death(self) -> IdentificationError:

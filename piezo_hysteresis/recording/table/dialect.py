@@ -104,7 +104,8 @@ class Dialect:
         rows = [[] if line.lstrip().startswith(COMMENT) else cells_of(line, delimiter) for line in lines]
         body = [row for row in rows if row][-40:]
         width = len(body[-1]) if body else 0
-        of_numbers = [at for at in range(width) if number_in(body[-1][at], comma) is not None]
+        names = {at for row in rows if len(row) == width for at, cell in enumerate(row) if cell.lower() == "phase"}
+        of_numbers = [at for at in range(width) if at not in names and number_in(body[-1][at], comma) is not None]
         like = (i for i, row in enumerate(rows) if len(row) == width and _all(row, of_numbers, comma))
         first = next((i for i in like if _has_numbers(rows[i], comma)), None)
         if width < 2 or first is None:

@@ -211,7 +211,7 @@ def _segment(
         pauses,
         phase=phase,
         start_time=start,
-        continues=bool(before) and (_flag(labels, "continues") if "continues" in labels else goes_on),
+        continues=_flag(labels, "continues") if "continues" in labels else bool(before) and goes_on,
         truncated=_flag(labels, "truncated"),
         initial_voltage=_number(labels, "initial_voltage"),
     )

@@ -28,6 +28,7 @@ from bokeh.server.auth_provider import AuthProvider
 from tornado.web import RequestHandler
 
 from ...errors import ParameterError
+from ...home_path import in_home
 
 SHORTEST_TOKEN = 16
 """Smallest number of characters of a token."""
@@ -68,7 +69,7 @@ def read_token(path: str | Path) -> str:
     ParameterError
         If there is no such file, others may read it, or its token is too short.
     """
-    path = Path(path).expanduser()
+    path = in_home(path)
     try:
         if not path.is_file():
             raise ParameterError(f"token_file: got '{path}', expected a file that exists")

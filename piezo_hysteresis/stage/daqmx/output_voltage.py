@@ -24,7 +24,9 @@ from .setup import DaqmxSetup
 from .tasks import Tasks
 
 _READ_BACK_ERROR = 2e-3
-"""Largest error of an output that the card reads back itself [V]."""
+"""Largest distance from the safe voltage at which an output that the card reads back counts as safe [V]."""
+_ZERO_ERROR, _GAIN_ERROR = 2e-2, 2e-3
+"""Largest errors of output and read-back together [V], [1]; several times those of a card that was calibrated."""
 
 
 class OutputVoltage:
@@ -50,19 +52,24 @@ class OutputVoltage:
     def found(self) -> float | None:
         """The voltage [V]; None if neither card nor monitor reports it.
 
-        One that cannot be told from the safe voltage, or from one inside the limits, counts as that.
+        One that cannot be told from the safe voltage, or from one inside the limits, counts as that. A monitor may be
+        wrong or not connected: only the card itself is believed that its output is outside the limits.
         """
-        found, uncertainty = self._tasks.output(), _READ_BACK_ERROR
-        if found is None:
-            if not self._setup.voltage_input:
-                return None
-            found = float(self.measured(self._tasks.read_once()).ravel()[0])
-            uncertainty = self._monitor_error
-        d = self._description
-        known = (d.safe_voltage, min(max(found, d.voltage_min), d.voltage_max))
-        near = next((voltage for voltage in known if abs(found - voltage) <= uncertainty), found)
-        self._tasks.include(near)
-        return near
+        d, reported = self._description, self._tasks.output()
+        if reported is not None:
+            inside = min(max(reported, d.voltage_min), d.voltage_max)
+            if abs(reported - d.safe_voltage) <= _READ_BACK_ERROR:
+                return d.safe_voltage
+            if abs(reported - inside) <= _tolerance(inside):
+                return inside
+            self._tasks.include(reported)
+            return reported
+        if not self._setup.voltage_input:
+            return None
+        measured = float(self.measured(self._tasks.read_once()).ravel()[0])
+        if abs(measured - d.safe_voltage) <= self._setup.voltage_tolerance / abs(self._setup.amplifier_gain):
+            return d.safe_voltage
+        return min(max(measured, d.voltage_min), d.voltage_max)
 
     def here(self) -> float:
         """The voltage [V], or without a report the last one that was certainly put out; DaqmxError without either."""
@@ -75,17 +82,24 @@ class OutputVoltage:
     def require(self, expected: float) -> None:
         """DaqmxError if another program has moved the output from a voltage [V]; a motion from there would be a step.
 
-        Without a report the output counts as unmoved.
+        Without a report of the card itself the output counts as unmoved.
         """
-        found = self.found()
-        if found is not None and abs(found - expected) > max(_READ_BACK_ERROR, self._monitor_error):
+        found = self.now(expected)
+        if found != expected:
             raise DaqmxError(
                 f"{self._description.name}: the output is at {found:g} V, expected {expected:g} V, where this "
                 "driver left it; end the other program that moves it"
             )
 
-    @property
-    def _monitor_error(self) -> float:
-        """Largest error of the monitor, in drive voltage [V]; 0 without one."""
-        s = self._setup
-        return s.voltage_tolerance / abs(s.amplifier_gain) if s.voltage_input else 0.0
+    def now(self, expected: float) -> float:
+        """The voltage [V] of an output that was left at `expected`: that, unless the card itself reports another."""
+        reported = self._tasks.output()
+        if reported is None or abs(reported - expected) <= _tolerance(expected):
+            return expected
+        self._tasks.include(reported)
+        return reported
+
+
+def _tolerance(voltage: float) -> float:
+    """Largest distance of the read-back from a voltage at which the output stands [V]: errors of output and input."""
+    return _ZERO_ERROR + _GAIN_ERROR * abs(voltage)

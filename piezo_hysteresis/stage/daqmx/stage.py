@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 
 import numpy as np
 
@@ -213,7 +213,8 @@ class DaqmxStage:
             except DeviceError:
                 self._abort()
         else:
-            self._voltage = self._output.here()
+            with suppress(DaqmxError):  # of a link that is lost: the output stands where it was left
+                self._voltage = self._output.now(self._voltage)
             if self._voltage != self._description.safe_voltage:
                 self._go(self._description.safe_voltage)
 

@@ -172,8 +172,8 @@ class Tasks:
         s = self._setup
         try:
             with self._faults("reading the output back"), self._task() as task:
-                name = f"{s.device}/_{s.output}_vs_aognd"
-                task.ai_channels.add_ai_voltage_chan(name, min_val=-s.sensor_range, max_val=s.sensor_range)
+                name, span = f"{s.device}/_{s.output}_vs_aognd", max(s.sensor_range, -s.voltage_min, s.voltage_max)
+                task.ai_channels.add_ai_voltage_chan(name, min_val=-span, max_val=span)
                 return float(self._finite(np.atleast_2d(np.asarray(task.read(), dtype=np.float64)))[0, 0])
         except UnsupportedError:
             return None

@@ -26,8 +26,9 @@ pytestmark = pytest.mark.nodes
     [
         ("driver_node", ["--bogus"], "--bogus"),
         ("compensation_node", ["-p", "model_file:=pipe"], "expected a regular file"),
+        ("identification_node", ["-p", "experiment_root:=~no_such_user/x"], "there is no home folder of that user"),
     ],
-    ids=["unknown argument", "pipe as model file"],
+    ids=["unknown argument", "pipe as model file", "home of nobody"],
 )
 def test_a_bad_argument_is_refused_in_one_line(lab, monkeypatch, executable, arguments, reason):
     os.mkfifo(lab.folder / "pipe")

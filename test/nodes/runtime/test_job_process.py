@@ -47,6 +47,15 @@ def test_a_job_returns_its_input():
         job.close()
 
 
+def test_a_suspended_job_can_be_ended():
+    """SIGTERM waits until it goes on, and the node waited with it."""
+    job = JobProcess("test", ECHO)
+    os.kill(job.pid, signal.SIGSTOP)
+    job.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(job.pid, 0)
+
+
 def test_a_death_before_anything_was_heard_is_reported():
     job = JobProcess("test", ECHO)
     try:
