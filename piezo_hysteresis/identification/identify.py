@@ -33,7 +33,7 @@ from ..model.sample_periods import identified_periods
 from ..record import Notice, Record
 from .fit.fit import Fit, Progress
 from .fit.form_uncertainty import ADEQUACY, with_form_uncertainty
-from .fit.joint import fit_dynamics, fit_lag
+from .fit.joint import fit_dynamics, fit_lag, without_intersample_error
 from .fit.normal_equations import Nuisance, residuals
 from .identification import INSEPARABLE, Identification, correlated_pairs, phase_errors, undetermined
 from .identified_range import LAG_ERROR, identified_range
@@ -184,6 +184,9 @@ def identify(
                 )
             )
         notices += more_notices
+        joint, records, more_notices = without_intersample_error(joint, records, floors, roles.fitted)
+        notices += more_notices
+        used = records, floors, roles.fitted
         noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
         comparisons, more_notices = compare_inputs(joint.model, records, noise, samples, chosen)
         notices += more_notices

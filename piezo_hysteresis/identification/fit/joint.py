@@ -21,10 +21,12 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from ...effects import Arx
-from ...errors import IdentificationError
+from ...errors import DivergenceError, IdentificationError
 from ...model.model import Model
 from ...record import Notice, Record
 from ..records.conditioning import records_to_fit
+from ..records.intersample_error import intersample_error
+from ..records.sampling import less
 from ..steps.dynamics import Dynamics
 from ..steps.hysteresis import hysteresis_numbers
 from ..steps.linear_start import dynamics_behind, dynamics_of, follower, with_dynamics
@@ -98,6 +100,27 @@ def fit_joint(
     free = hysteresis_numbers(model)
     free += [f"{Arx.name}.{n}" for n in dynamics_of(model).free_names() if n != "delay"]
     return fit(model, kept, free, floors=sizes, nuisance=Nuisance(offset=True), damping=NEAR, progress=progress)
+
+
+def without_intersample_error(
+    joint: Fit, records: tuple[Record, ...], floors: Sequence[float], fitted: Collection[int]
+) -> tuple[Fit, tuple[Record, ...], tuple[Notice, ...]]:
+    """The fit of `fit_joint` repeated without the inter-sample error of averaged records, and these without it.
+
+    The averages of a drive do not reach its turns, which loop and dynamics would describe by a later and wider loop.
+    A notice names the records in which this is more than the floor.
+    """
+    try:
+        lost = intersample_error(joint.model, records)
+    except DivergenceError:  # on a record that moves further than those that were fitted
+        return joint, records, ()
+    if not any(lost[i].any() for i in fitted):
+        return joint, records, ()
+    records = less(records, lost)
+    phases = dict.fromkeys(records[i].phase for i in fitted if np.std(lost[i]) > floors[i])
+    message = f"{' and '.join(phases)} were stored as averages: the turns of the drive between samples were allowed for"
+    notices = (Notice("intersample_error", message),) if phases else ()
+    return fit_joint(joint.model, records, floors, fitted), records, notices
 
 
 def fit_dynamics(
