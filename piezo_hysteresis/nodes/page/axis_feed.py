@@ -79,11 +79,10 @@ class AxisFeed:
 
     def call(self, service: str) -> Reply[Answer]:
         """Call a service; from any thread."""
-        reply: Reply[Answer] = Reply()
         client = self._clients[service]
         if not client.service_is_ready():
-            reply.set_result(Answer(False, f"no node serves {self._prefix}/{service}; is the node running?"))
-            return reply
+            return unsent(f"no node serves {self._prefix}/{service}; is the node running?")
+        reply: Reply[Answer] = Reply()
         self._waiting.append((time.monotonic(), reply, service))
         client.call_async(Trigger.Request()).add_done_callback(self._node.guarded(lambda done: _answer(reply, done)))
         return reply
@@ -153,6 +152,13 @@ def to_status(message: DiagnosticStatus) -> Status:
         printable(message.message[:_LONGEST_TEXT]),
         {printable(k[:100]): printable(v[:_LONGEST_TEXT]) for k, v in values_of(message).items()},
     )
+
+
+def unsent(reason: str) -> Reply[Answer]:
+    """The reply to a call that was not sent."""
+    reply: Reply[Answer] = Reply()
+    reply.set_result(Answer(False, reason))
+    return reply
 
 
 def _answer(reply: Reply[Answer], done: Future) -> None:

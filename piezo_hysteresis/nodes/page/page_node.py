@@ -33,7 +33,7 @@ from ..runtime.guarded_node import GuardedNode
 from ..runtime.parameters import declare, read
 from ..runtime.process import run
 from ..topics import DIAGNOSTICS, TOPICS, subscribe
-from .axis_feed import AxisFeed
+from .axis_feed import AxisFeed, unsent
 
 PAGE: tuple[Row, ...] = (
     Setting("address", "127.0.0.1", "address to listen on; one that other machines reach needs token_file"),
@@ -85,11 +85,7 @@ class PageNode(GuardedNode):
     def call(self, axis: str, service: str) -> Reply[Answer]:
         """Call a service of an axis; from any thread."""
         feed = self._feeds.get(axis)
-        if feed is not None:
-            return feed.call(service)
-        reply: Reply[Answer] = Reply()
-        reply.set_result(Answer(False, f"no axis '{axis}' was found yet; nothing was sent"))
-        return reply
+        return unsent(f"no axis '{axis}' was found yet; nothing was sent") if feed is None else feed.call(service)
 
     def _follow(self, axis: str) -> None:
         name = "/" + axis.strip("/")

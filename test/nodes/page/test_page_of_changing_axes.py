@@ -20,6 +20,7 @@ import re
 import signal
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from sensor_msgs.msg import PointCloud2
 
 from piezo_hysteresis.changes.recalibration_history import FILE, read_numbers
 from piezo_hysteresis.nodes.messages.conversions import command_to_cloud
+from piezo_hysteresis.nodes.page.page_node import PageNode
 
 pytestmark = pytest.mark.nodes
 
@@ -53,6 +55,13 @@ def nodes(shared_lab, browser):
     browser.open(url)
     browser.wait(lambda: "idle" in browser.text("phase"), "the phase")
     return lab
+
+
+def test_a_call_before_an_axis_was_found_is_answered():
+    """The page went on to say that it was sent."""
+    answer = PageNode.call(SimpleNamespace(_feeds={}), "", "driver_node/stop").result(timeout=1.0)
+    assert not answer.success
+    assert answer.message == "no axis '' was found yet; nothing was sent"
 
 
 def scan(lab, axis, seconds):
