@@ -25,17 +25,11 @@ import numpy as np
 from ...errors import StageError
 from ..description import Samples
 from .daqmx_error import DaqmxError, EmptyBufferError, UnsupportedError, reported
+from .link import Link
 from .setup import DaqmxSetup
 
 _RATE_TOLERANCE = 1e-4
 """Relative difference up to which the rate of the card counts as the requested one."""
-
-_OPTIONS = (
-    ("grpc.max_receive_message_length", -1),
-    ("grpc.max_send_message_length", -1),
-    ("grpc.use_local_subchannel_pool", 1),  # a new channel opens a new link instead of waiting for the old one
-)
-"""Options of the link to the server."""
 
 
 class Tasks:
@@ -67,13 +61,15 @@ class Tasks:
                 "NI-DAQmx: the package nidaqmx is not installed; install it with pip install 'nidaqmx[grpc]'"
             ) from None
         self._setup, self._nidaqmx = setup, nidaqmx
-        nothing: Any = None
-        self._channel, self._calls, self._output, self._input = nothing, nothing, nothing, nothing
-        self._writer, self._reader = nothing, nothing
-        self._sample_period, self._queued = setup.sample_period, 0.0  # the latter: duration of the output in the buffer
+        self._link = Link(setup, nidaqmx)
+        self._output: Any = None
+        self._input: Any = None
+        self._writer: Any = None
+        self._reader: Any = None
+        self._sample_period = setup.sample_period
+        self._queued = 0.0  # duration of the output in the buffer [s]
         self.last_written: float | None = None
         self._lowest, self._highest = setup.voltage_min, setup.voltage_max
-        self._connect()
 
     @property
     def is_running(self) -> bool:
@@ -154,7 +150,7 @@ class Tasks:
         with suppress(DaqmxError):
             self.stop()
         self.close()
-        self._connect()
+        self._link = Link(self._setup, self._nidaqmx)
 
     def play(self, drive: Samples, sample_period: float) -> None:
         """Put out at least two drive voltages [V] once, on the clock of the card, and return when that is done."""
@@ -171,7 +167,7 @@ class Tasks:
         """Voltage at the output [V], read back by the card itself; None if it cannot."""
         s = self._setup
         try:
-            with self._faults("reading the output back"), self._task() as task:
+            with self._faults("reading the output back"), self._link.task() as task:
                 name, span = f"{s.device}/_{s.output}_vs_aognd", max(s.sensor_range, -s.voltage_min, s.voltage_max)
                 task.ai_channels.add_ai_voltage_chan(name, min_val=-span, max_val=span)
                 return float(self._finite(np.atleast_2d(np.asarray(task.read(), dtype=np.float64)))[0, 0])
@@ -190,17 +186,7 @@ class Tasks:
 
     def close(self) -> None:
         """Release the link to a server."""
-        if self._channel is not None:
-            self._channel.close()
-
-    def _connect(self) -> None:
-        if self._setup.server:
-            import grpc
-
-            from .deadline import Deadline
-
-            self._channel = grpc.insecure_channel(self._setup.server, options=_OPTIONS)
-            self._calls = grpc.intercept_channel(self._channel, Deadline(self._setup.timeout))
+        self._link.close()
 
     def _require_rate(self, asked: float) -> None:
         """DaqmxError if the card samples at another rate; it takes the nearest one that it has, without a message."""
@@ -220,18 +206,13 @@ class Tasks:
             )
         return samples
 
-    def _task(self) -> Any:
-        if self._channel is None:
-            return self._nidaqmx.Task()
-        return self._nidaqmx.Task(grpc_options=self._nidaqmx.GrpcSessionOptions(self._calls, ""))
-
     def _output_task(self) -> Any:
-        s, task = self._setup, self._task()
+        s, task = self._setup, self._link.task()
         task.ao_channels.add_ao_voltage_chan(f"{s.device}/{s.output}", min_val=self._lowest, max_val=self._highest)
         return task
 
     def _input_task(self) -> Any:
-        s, task = self._setup, self._task()
+        s, task = self._setup, self._link.task()
         for name in (s.displacement_input, s.voltage_input):
             if name:
                 channels = task.ai_channels
