@@ -34,7 +34,7 @@ CONDITIONING = "conditioning"
 """Name of a phase that brings the stage into a known state; the history before it is unknown."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, weakref_slot=True)
 class Record(Pictured):
     """One phase of an experiment at a constant sample period.
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ...record import Record, Samples
 from .noise import noise_of, noise_on_motion, voltage_noise
+from .once import once_per_record
 from .steady_waves import is_row_of_waves, rates_of_waves
 
 SLOW = 30.0
@@ -105,6 +106,7 @@ class ExcitationContent:
         return self.bandwidth <= SLOW
 
 
+@once_per_record
 def excitation_content(record: Record) -> ExcitationContent:
     """Judge a record by the spectrum of its dv/dt and the noise of its displacement."""
     span = float(np.ptp(np.append(record.voltage, record.settled_voltage)))

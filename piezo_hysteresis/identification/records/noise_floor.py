@@ -31,6 +31,7 @@ from ...channel_mapping import quantity_of
 from ...record import Experiment, Record
 from ..fit.form_uncertainty import ADEQUACY
 from .noise import noise_on_motion
+from .once import once_per_record
 
 ADEQUATE = 1.5
 """Mean squared ratio of residual to floor up to which nothing is missing beyond noise."""
@@ -55,6 +56,7 @@ def stroke(records: Sequence[Record]) -> float:
     return Experiment(tuple(records)).range
 
 
+@once_per_record
 def white_noise(record: Record) -> float:
     """RMS of the white noise of a record [m], from the median of its spectrum near the Nyquist frequency.
 
@@ -83,6 +85,7 @@ def _at_top(second: Array, size: int, window: str) -> float:
     return float(np.sqrt(np.median(flat) / np.log(2.0) / 2.0))
 
 
+@once_per_record
 def period_scatter(record: Record) -> float | None:
     """RMS of the part that does not repeat from one drive period to the next [m]; None for fewer than three periods.
 

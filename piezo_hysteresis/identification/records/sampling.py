@@ -51,7 +51,9 @@ ALIKE = 0.1
 
 def less(records: Sequence[Record], changes: Sequence[Array]) -> tuple[Record, ...]:
     """The records with one array of changes each subtracted from their displacement [m]."""
-    return tuple(replace(r, displacement=r.displacement - c) for r, c in zip(records, changes, strict=True))
+    return tuple(
+        replace(r, displacement=r.displacement - c) if c.any() else r for r, c in zip(records, changes, strict=True)
+    )
 
 
 def slowed(record: Record) -> Record:
