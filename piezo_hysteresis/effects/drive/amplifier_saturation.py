@@ -104,6 +104,8 @@ class AmplifierSaturationBlock(MemorylessBlock):
     def _ramp(self, excess: Array) -> tuple[Array, Array, Array]:
         """Ramp, and its derivatives with respect to the excess and to the corner."""
         c = self.corner
+        if not excess.max(initial=-np.inf) > -c:  # as in most blocks, and always where there is no limit
+            return (np.zeros(excess.size),) * 3
         bent = np.abs(excess) < c
         e = np.where(bent, excess, 0.0)
         width = c if c > 0.0 else 1.0
