@@ -161,7 +161,7 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
     conclusion, reason = said
     is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
     found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
-    noted = state.experiment.noting(*missing_excitation(setup.records, setup.usable, found))
+    noted = state.experiment.noting(*missing_excitation(state.experiment.records, setup.usable, found))
     everywhere = None
     if delivered is not given and len(tested) < len(setup.usable):
         with suppress(DivergenceError):
