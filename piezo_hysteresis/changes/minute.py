@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,28 @@ class Minute:
     displacement: Array
     offset: float
 
+    def save(self, path: Path) -> None:
+        """Write the samples to an NPZ file."""
+        drive = self.drive
+        np.savez(
+            path,
+            past=np.array([drive.rest_voltage, drive.start_time, drive.slow_period, drive.sample_period]),
+            slow=drive.slow,
+            full=drive.full,
+            holds=np.reshape(drive.holds, (-1, 2)),
+            displacement=self.displacement,
+            offset=self.offset,
+        )
+
+    @classmethod
+    def load(cls, path: Path) -> Minute:
+        """Samples of a file that `save` has written."""
+        with np.load(path, allow_pickle=False) as file:
+            rest, start, slow_period, period = map(float, file["past"])
+            holds = tuple((int(values), float(duration)) for values, duration in file["holds"])
+            drive = DriveHistory(rest, start, slow_period, period, file["slow"], file["full"], holds)
+            return cls(drive, file["displacement"], float(file["offset"]))
+
     def scores(self, model: Model, offset: float) -> list[ChangeScore]:
         """Scores of the samples with a model, where sensor minus model is `offset` [m].
 
@@ -75,7 +98,8 @@ def _state_before(
     chain = model.at(drive.slow_period) if drive.slow.size else fast
     state = chain.rest(drive.rest_voltage, drive.start_time, since=0.0)
     tangent = chain.rest_tangent(drive.rest_voltage, loop, drive.start_time)
-    for running, voltage in ((chain, drive.slow), (fast, drive.full[:first])):
+    for period, voltage in (*drive.until(first), (drive.sample_period, np.empty(0))):
+        running = model.at(period)
         if running is not chain:
             state, tangent, chain = running.resume(state), running.resume_tangent(state, tangent), running
         for start in range(0, voltage.size, _PIECE):

@@ -136,11 +136,19 @@ def standard_errors(model: Model, records: Iterable[Record]) -> list[Array]:
     return found
 
 
+def held_drive(voltage: float, duration: float, sample_period: float) -> tuple[float, Array]:
+    """Sample period [s] and voltages [V] of a hold [s] after samples of a period: if it is long, a few long samples."""
+    steps = round(duration / sample_period)
+    if steps > HOLD_STEPS and duration > SHORT_GAP:
+        steps, sample_period = HOLD_STEPS, duration / HOLD_STEPS
+    return sample_period, np.full(steps, voltage)
+
+
 def after_hold(model: Model, state: ChainState, voltage: float, duration: float) -> ChainState:
-    """State after a long time [s] at one voltage [V], in a few long steps: the dynamics have settled long before."""
-    steps = min(max(1, round(duration / state.sample_period)), HOLD_STEPS)
-    slow = model.at(max(duration / steps, state.sample_period))
-    return model.at(state.sample_period).resume(slow.run(np.full(steps, voltage), slow.resume(state))[1])
+    """State after a further time [s] at the voltage [V] that is held."""
+    period, held = held_drive(voltage, duration, state.sample_period)
+    slow = model.at(period)
+    return model.at(state.sample_period).resume(slow.run(held, slow.resume(state))[1])
 
 
 def _with_holds(records: Iterable[Record]) -> Iterator[tuple[int | None, Record]]:
@@ -148,13 +156,9 @@ def _with_holds(records: Iterable[Record]) -> Iterator[tuple[int | None, Record]
     before: Record | None = None
     for index, record in enumerate(records):
         if before is not None and record.continues:
-            end, period = before.start_time + before.duration, before.sample_period
-            gap = record.start_time - end
-            steps = round(gap / period)
-            if steps > HOLD_STEPS and gap > SHORT_GAP:
-                steps, period = HOLD_STEPS, gap / HOLD_STEPS
-            if steps > 0:
-                held = np.full(steps, before.voltage[-1])
+            end = before.start_time + before.duration
+            period, held = held_drive(before.voltage[-1], max(0.0, record.start_time - end), before.sample_period)
+            if held.size:
                 yield None, Record(held, held, period, "hold", start_time=end, continues=True)
         yield index, record
         before = record

@@ -17,10 +17,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..model.free_run import held_drive
 
 Array = NDArray[np.float64]
 
@@ -51,6 +54,8 @@ class DriveHistory:
         Averages over `slow_period` [V], the oldest first.
     full : (n,) ndarray
         All samples after the averages [V].
+    holds : tuple of (int, float)
+        Times at one voltage that have no values: the number of values before each, and its duration [s].
     """
 
     rest_voltage: float
@@ -59,6 +64,18 @@ class DriveHistory:
     sample_period: float
     slow: Array
     full: Array
+    holds: tuple[tuple[int, float], ...] = ()
+
+    def until(self, first: int) -> Iterator[tuple[float, Array]]:
+        """The drive before value `first` of `full`: sample period [s] and voltages [V], part by part."""
+        values, begin = np.concatenate((self.slow, self.full[:first])), 0
+        kept = [hold for hold in self.holds if hold[0] <= values.size]
+        for end, hold in sorted([*kept, (self.slow.size, 0.0), (values.size, 0.0)]):
+            period = self.slow_period if begin < self.slow.size else self.sample_period
+            yield period, values[begin:end]
+            if hold:
+                yield held_drive(values[end - 1] if end else self.rest_voltage, hold, period)
+            begin = end
 
 
 class VoltageHistory:
@@ -193,8 +210,14 @@ class VoltageHistory:
         """A frozen copy of the history as it is now."""
         period = self.sample_period
         full = self._full[: self._kept].copy()
-        start_time = (self.start + self.held_until(self.count)) * period  # the newest samples have their true time
-        return DriveHistory(self.rest_voltage, start_time, self.factor * period, period, self._slow.copy(), full)
+        start_time = (self.start + self.held_until(self.start)) * period
+        holds = tuple((self._values_until(at), n * period) for at, n in self._holds if at > self.start)
+        return DriveHistory(self.rest_voltage, start_time, self.factor * period, period, self._slow.copy(), full, holds)
+
+    def _values_until(self, position: int) -> int:
+        """Number of values that are kept, averaged or in full, up to a position in the stream."""
+        in_full = position - self._full_start
+        return self._slow.size + (in_full if in_full >= 0 else in_full // self.factor)
 
     @property
     def _full_start(self) -> int:

@@ -16,11 +16,10 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-
-import numpy as np
 
 from ...changes.group_fit import fit_groups
 from ...changes.minute import Minute
@@ -28,11 +27,10 @@ from ...changes.recalibration_history import RecalibratedNumber, numbers_of
 from ...model.model_file import dumps, loads
 from ...model.model_parameters import model_hash
 from ...online.change.baseline import Baseline
-from ...online.voltage_history import DriveHistory
 from ..runtime.fit_process import Outcome
 from ..runtime.job_process import Report
 
-_MINUTE, _BASELINE = "minute.npz", "baseline.npz"
+_MINUTE, _BASELINE, _ASKED = "minute.npz", "baseline.npz", "asked.json"
 """Files of a task."""
 
 
@@ -54,33 +52,22 @@ class RecalibrationOutcome(Outcome):
 
 def write_task(folder: Path, minute: Minute, baseline: Baseline, group: str, interval: float, statistic: float) -> None:
     """Write the files that `recalibration` reads."""
-    drive = minute.drive
-    np.savez(
-        folder / _MINUTE,
-        rest=np.array([drive.rest_voltage, drive.start_time, drive.slow_period, drive.sample_period]),
-        slow=drive.slow,
-        full=drive.full,
-        displacement=minute.displacement,
-        asked=np.array([minute.offset, interval, statistic]),
-        group=np.array(group),
-    )
+    minute.save(folder / _MINUTE)
     baseline.save(folder / _BASELINE)
+    (folder / _ASKED).write_text(json.dumps([group, interval, statistic]), encoding="utf-8")
 
 
 def recalibration(folder: Path, model: str, report: Report) -> RecalibrationOutcome:
     """Fit the changed group to the minute of samples in a folder."""
     report("reading", 0.0)
-    with np.load(folder / _MINUTE, allow_pickle=False) as file:
-        rest, start, slow_period, period = map(float, file["rest"])
-        drive = DriveHistory(rest, start, slow_period, period, file["slow"], file["full"])
-        offset, interval, statistic = map(float, file["asked"])
-        minute, group = Minute(drive, file["displacement"], offset), str(file["group"])
+    minute = Minute.load(folder / _MINUTE)
+    group, interval, statistic = json.loads((folder / _ASKED).read_text(encoding="utf-8"))
     before, baseline = loads(model), Baseline.load(folder / _BASELINE)
     report("fitting", 0.1)
     fit = fit_groups(before, minute, baseline, group, interval)
     time = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     after = replace(fit.model, provenance={**fit.model.provenance, "recalibrated": time})
-    numbers = numbers_of(before, offset, fit, time, statistic, (model_hash(before), model_hash(after)))
+    numbers = numbers_of(before, minute.offset, fit, time, statistic, (model_hash(before), model_hash(after)))
     verdict = (
         f"{' and '.join(fit.groups)} recalibrated on {fit.duration:.0f} s: residual {1e9 * fit.before:.3g} nm before, "
         f"{1e9 * fit.after:.3g} nm after, {1e9 * fit.floor:.3g} nm in the baseline"
