@@ -230,8 +230,14 @@ class AxesJoiner:
             period = stream.period
         else:
             stream.since, stream.period = None, None
-        if period is not None and abs(period / self.sample_period - 1.0) > max(tolerance, PERIOD_TOLERANCE):
-            raise RecordError(f"got the sample period {period:g} s, expected {self.sample_period:g} s as the model has")
+        if period is not None:
+            require_period(period, self.sample_period, max(tolerance, PERIOD_TOLERANCE))
+
+
+def require_period(period: float, expected: float, tolerance: float = PERIOD_TOLERANCE) -> None:
+    """Raise RecordError for samples of another period than that of the model [s]."""
+    if abs(period / expected - 1.0) > tolerance:
+        raise RecordError(f"got the sample period {period:g} s, expected {expected:g} s as the model has")
 
 
 def _time(block: SampleBlock) -> int:

@@ -30,7 +30,7 @@ from ...errors import PiezoError, RecordError, printable
 from ...model import axes_file
 from ...model.axes_model import AxesModel
 from ...model.model_parameters import first_bits
-from ...online.axes_joiner import AxesJoiner, JoinedBlock
+from ...online.axes_joiner import AxesJoiner, JoinedBlock, require_period
 from ...online.axes_predictor import AxesPredictor
 from ...parameter import Row, Setting, parts_of
 from ..model.publishers import LIVE, Predicted
@@ -73,7 +73,7 @@ class AxesModelNode(GuardedNode):
         self._predictor: AxesPredictor | None = None
         if self._values["model_file"]:
             self._load(self._values["model_file"])
-        let_change(self, AXES, "model_file", axes_file.load, self._load)
+        let_change(self, AXES, "model_file", self._usable, self._load)
         self.create_service(Trigger, "~/zero", self._on_zero)
         self.get_logger().info(f"{LISTENING} of {', '.join(stream.name for stream in self._streams)}")
 
@@ -130,9 +130,18 @@ class AxesModelNode(GuardedNode):
             stream.topics.publish(predicted, joiner.joined, joiner.sample_period)
         self._diagnostics.reached(predictor.level)
 
+    def _usable(self, path: str) -> AxesModel:
+        """The model in a file; raises PiezoError if there is none, or if the streams have other samples than it."""
+        model = axes_file.load(path)
+        self._require_axes(model)
+        for stream in self._streams:
+            if stream.period is not None:
+                require_period(stream.period, model.sample_period)
+        return model
+
     def _load(self, path: str) -> None:
         try:
-            model = axes_file.load(path)
+            model = self._usable(path)
             joiner = AxesJoiner(len(self._streams), model.sample_period)
         except PiezoError as error:
             self._diagnostics.refused(f"model_file: {error}")

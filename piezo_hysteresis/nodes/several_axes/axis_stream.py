@@ -49,6 +49,8 @@ class AxisStream:
         The namespace.
     axes : tuple of int, or None
         Numbers of voltages and of displacements in the newest block; None before the first one.
+    period : float or None
+        Sample period of the newest block of several samples [s]; None before the first one.
     topics : ModelTopics
         Publishers of the predictions.
     """
@@ -56,6 +58,7 @@ class AxisStream:
     def __init__(self, node: Node, namespace: str, received: Callable[[bytes], None]) -> None:
         self.name = namespace or node.get_namespace()
         self.axes: tuple[int, int] | None = None
+        self.period: float | None = None
         self._reader = SampleReader(axis_of)
         self.topics = ModelTopics(node, namespace)
         subscribe(node, "samples", received, namespace, deep=True, raw=True)
@@ -64,6 +67,7 @@ class AxisStream:
         """Block of a message with its further axes; RecordError where it cannot be read."""
         block = self._reader.read(message)
         self.axes = len(axes_of(block.channels, "voltage")), len(axes_of(block.channels, "displacement"))
+        self.period = block.sample_period or self.period
         return block
 
 

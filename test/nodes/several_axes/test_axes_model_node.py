@@ -14,6 +14,8 @@
 
 """The model node of several axes, behind real drivers: one that replays all axes, and one of each axis."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -183,6 +185,12 @@ def test_a_wrong_file_a_missing_axis_and_other_numbers_are_told_and_the_node_run
     lab.wait(
         lambda: reported(reports, "got 2 drives and 2 displacements of all axes, expected 3 and 3"), "the missing axis"
     )
+    assert "expected 3 and 3 as the model has" in written(tmp_path / "model.npz").reason
+    two = identify_axes([plant(seed, gains=GAINS[:2, :2]) for seed in (1, 2)], length=5)
+    slow = written(axes_file.save(replace(two, sample_period=2e-3), tmp_path / "slow.npz"))
+    assert slow.reason == "got the sample period 0.001 s, expected 0.002 s as the model has"
+    assert written(axes_file.save(two, tmp_path / "two.npz")).successful
+    lab.wait(lambda: values_of(reported(reports, "")[-1]).get("received", "0") != "0", "the prediction of two axes")
     assert lab.call(Trigger, "axes_model_node/zero").success
     assert lab.processes[0].is_running
 
