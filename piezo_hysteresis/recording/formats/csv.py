@@ -106,6 +106,8 @@ def _experiment(path: Path, cells: Cells, found: Places, options: ReadOptions) -
     notices += found.notices
     if options.average is None and cells.average > 1:
         notices.append(averaged_notice(cells.average, records[0].sample_period))
+    if cells.is_cut:
+        notices.append(Notice("cut", "the file ends within a row, which was left out"))
     if cells.bad:
         example = f", e.g. '{printable(cells.example[:_SHOWN])}'" if cells.example else ""
         notices.append(Notice("not_a_number", f"{cells.bad} cells are empty or hold no number{example}"))

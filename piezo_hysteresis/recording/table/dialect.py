@@ -80,8 +80,18 @@ class Dialect:
             if block.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
                 raise RecordingError("got text in UTF-16, expected UTF-8 or Latin-1; save it again as UTF-8")
             lines = decoded(block).splitlines()
-            if file.read(1) and len(lines) > 1:
-                lines.pop()  # it may be incomplete
+            if file.read(1) or not block.endswith((b"\n", b"\r")):  # the last line may be incomplete
+                return cls._best(lines[:-1]) or cls._of(lines)
+        return cls._of(lines)
+
+    @classmethod
+    def _of(cls, lines: Sequence[str]) -> Dialect:
+        if (found := cls._best(lines)) is None:
+            raise RecordingError("got no rows of numbers in two or more columns")
+        return found
+
+    @classmethod
+    def _best(cls, lines: Sequence[str]) -> Dialect | None:
         best: tuple[float, int, Dialect] | None = None
         for delimiter, comma in (
             (",", False),
@@ -95,9 +105,7 @@ class Dialect:
             found = cls._with(lines, delimiter, comma)
             if found is not None and (best is None or found[:2] > best[:2]):
                 best = found
-        if best is None:
-            raise RecordingError("got no rows of numbers in two or more columns")
-        return best[2]
+        return best and best[2]
 
     @classmethod
     def _with(cls, lines: Sequence[str], delimiter: str | None, comma: bool) -> tuple[float, int, Dialect] | None:

@@ -51,6 +51,8 @@ class Cells:
     """The first of them that is not empty, if there is one."""
     average: int
     """Rows that were averaged into one."""
+    is_cut: bool
+    """Whether the file ends within a row, which is left out."""
 
 
 class _Part:
@@ -72,7 +74,7 @@ class _Part:
             if not self.marks or self.marks[-1][1] != labels:
                 self.marks.append((self.buffer.rows + row, labels))
 
-    def cells(self, names: Iterable[str]) -> Cells:
+    def cells(self, names: Iterable[str], is_cut: bool) -> Cells:
         """What was read."""
         buffer = self.buffer
         columns = {name: buffer.column(at) for at, name in enumerate(names)}
@@ -82,6 +84,7 @@ class _Part:
             self.bad,
             self.example,
             buffer.factor,
+            is_cut,
         )
 
 
@@ -108,7 +111,12 @@ def read_cells(
         On a line that is longer than a block, or more samples than can be kept.
     """
     read = [_Part(len(numbers), options) for options in parts]
-    for lines in _line_blocks(path, dialect.skipped):
+    is_cut, before = False, ""
+    for lines, is_last in _line_blocks(path, dialect.skipped):
+        if is_last and _is_cut(lines[-1], before, dialect):
+            is_cut = True
+            break
+        before = lines[-1]
         holders = [part for part in read if part.overlaps(len(lines))]
         values, wrong, example = np.empty((len(lines), len(numbers))), 0, ""  # of skipped rows, if no part holds them
         if holders:
@@ -126,11 +134,20 @@ def read_cells(
             part.buffer.add(values)
         if all(part.buffer.is_full for part in read):
             break
-    return [part.cells(numbers) for part in read]
+    return [part.cells(numbers, is_cut) for part in read]
 
 
-def _line_blocks(path: Path, skipped: int) -> Iterator[list[str]]:
-    """Rows of a file, without empty lines and comments, about a block at a time."""
+def _is_cut(line: str, before: str, dialect: Dialect) -> bool:
+    """Whether a line that has no end lacks cells, or the rest of a word of the line before."""
+    cells, last = cells_of(line, dialect.delimiter), cells_of(before, dialect.delimiter)[-1:]
+    if not before or len(cells) < dialect.width:
+        return bool(before)
+    is_word = number_in(last[0], dialect.decimal_comma) is None
+    return is_word and cells[-1] != last[0] and last[0].startswith(cells[-1])
+
+
+def _line_blocks(path: Path, skipped: int) -> Iterator[tuple[list[str], bool]]:
+    """Rows of a file, without empty lines and comments, about a block at a time; True with a last row without end."""
     with path.open("rb") as file:
         rest = b""
         ended = False
@@ -147,7 +164,7 @@ def _line_blocks(path: Path, skipped: int) -> Iterator[list[str]]:
             if not rows or not rows[-1].strip() or any(mark in whole for mark in _NO_ROW):
                 rows = [line for line in rows if line.strip() and not line.lstrip().startswith(COMMENT)]
             if rows:
-                yield rows
+                yield rows, ended
 
 
 def _parsed(lines: list[str], dialect: Dialect, columns: list[int]) -> tuple[Samples, int, str]:
