@@ -22,7 +22,10 @@ from concurrent.futures import Future as Reply
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import InvalidServiceNameException
+from rclpy.validate_full_topic_name import validate_full_topic_name
 
+from ...errors import ParameterError, printable
 from ...parameter import Row, Setting, parts_of
 from ...report.live.access import read_token
 from ...report.live.axis_state import AxisState
@@ -58,9 +61,9 @@ class PageNode(GuardedNode):
         super().__init__("page_node")
         declare(self, PAGE, read_only=True)
         values = read(self, PAGE)
-        self._named = parts_of(values["axes"])
         self._feeds: dict[str, AxisFeed] = {}
-        for axis in self._named:
+        self._named = [namespace(axis) for axis in parts_of(values["axes"])]
+        for axis in dict.fromkeys(self._named):
             self._follow(axis)
         subscribe(self, DIAGNOSTICS, self._on_diagnostics)
         self.create_timer(_SEARCH_INTERVAL, self._search, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -88,8 +91,7 @@ class PageNode(GuardedNode):
         return unsent(f"no axis '{axis}' was found yet; nothing was sent") if feed is None else feed.call(service)
 
     def _follow(self, axis: str) -> None:
-        name = "/" + axis.strip("/")
-        self._feeds = {**self._feeds, name: AxisFeed(self, name)}
+        self._feeds = {**self._feeds, axis: AxisFeed(self, axis)}
 
     def _search(self) -> None:
         for feed in self._feeds.values():
@@ -98,15 +100,31 @@ class PageNode(GuardedNode):
             return
         kind = TOPICS["samples"].type_name
         for name, kinds in self.get_topic_names_and_types():
-            axis, _, topic = name.rpartition("/")
-            known = (axis or "/") in self._feeds
-            if topic == "samples" and kind in kinds and not known and len(self._feeds) < _MOST_AXES:
-                self.get_logger().info(f"found the axis {axis or '/'}")
+            axis = name.removesuffix("samples").rstrip("/") or "/"
+            is_new = axis not in self._feeds and len(self._feeds) < _MOST_AXES
+            if name.endswith("/samples") and kind in kinds and is_new:
+                self.get_logger().info(f"found the axis {axis}")
                 self._follow(axis)
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
         for status in array.status:
             any(feed.report(status) for feed in self._feeds.values())
+
+
+def namespace(text: str) -> str:
+    """Absolute name of a namespace, ``/`` for none.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    name = "/" + text.strip("/")
+    try:
+        validate_full_topic_name(f"{name.rstrip('/')}/model_node/plan_recalibration", is_service=True)
+    except InvalidServiceNameException:
+        raise ParameterError(f"axes: got '{printable(text)}', expected a namespace such as /stage_x") from None
+    return name
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
