@@ -16,14 +16,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from html import escape
 from importlib.resources import files
+from itertools import count
 
 from bokeh.document import Document
-from bokeh.models import Div, InlineStyleSheet, UIElement
+from bokeh.models import CustomJS, Div, InlineStyleSheet, UIElement
+
+TICK = 250
+"""Time between two drawings [ms]."""
+
+_WATCH = """
+const page = document.body
+const search = () => fetch("static/js/bokeh.min.js", {method: "HEAD", cache: "no-store"})
+  .then(answer => { if (answer.ok && !page.classList.contains("live")) location.reload() }, () => {})
+clearInterval(page.search)
+clearTimeout(page.silence)
+page.classList.add("live")
+page.silence = setTimeout(() => {
+  page.classList.remove("live")
+  page.search = setInterval(search, 10000)
+}, 3000)
+"""
+"""Runs in the browser at every drawing. Without one for 3 s the page is marked, because its numbers are old and its
+buttons do nothing, and it is loaded anew as soon as the server answers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +69,14 @@ class Section:
         return str(self.part.name)
 
 
-def lay_out(document: Document, heading: str, top: Sequence[UIElement], sections: Sequence[Section]) -> None:
-    """Fill a document.
+def lay_out(
+    document: Document,
+    heading: str,
+    top: Sequence[UIElement],
+    sections: Sequence[Section],
+    draw: Callable[[], None],
+) -> None:
+    """Fill a document, and draw it from now on. The browser marks a page that is not drawn any more.
 
     Parameters
     ----------
@@ -63,7 +88,17 @@ def lay_out(document: Document, heading: str, top: Sequence[UIElement], sections
         Stand in the head of the page, which does not scroll away on a wide screen.
     sections : sequence of Section
         Boxes, in order.
+    draw : callable
+        Called at once, and then in every `TICK`.
     """
+    document.config.update(reconnect_session=False, notify_connection_status=False)  # to other models, after a restart
+    drawn, numbers = sections[0].part, count(1)
+    drawn.js_on_change("tags", CustomJS(code=_WATCH))
+
+    def tick() -> None:
+        draw()
+        drawn.tags = [next(numbers)]
+
     for part in (*top, *(section.part for section in sections)):
         document.add_root(part)
     document.title = heading
@@ -71,6 +106,8 @@ def lay_out(document: Document, heading: str, top: Sequence[UIElement], sections
     document.template_variables.update(
         heading=escape(heading), page_css=_text("page.css"), top=[part.name for part in top], sections=list(sections)
     )
+    tick()
+    document.add_periodic_callback(tick, TICK)
 
 
 def text_panel(name: str, styles: InlineStyleSheet) -> Div:

@@ -17,12 +17,14 @@
 from __future__ import annotations
 
 import time
+from html import escape
 
 import numpy as np
 from bokeh.document import Document
 from bokeh.layouts import column
-from bokeh.models import Select, Toggle
+from bokeh.models import CustomJS, Select, Toggle
 
+from ...errors import printable
 from ...identification.records.noise_floor import white_noise
 from ...record import Record
 from . import panels
@@ -37,14 +39,14 @@ from .source import LiveSource
 TITLE = "Piezo stage, live"
 """Heading of the page."""
 
-TICK = 250
-"""Time between two drawings [ms]."""
-
 SLOW = 1.0
 """Time between two spectra and two estimates of the noise [s]."""
 
 WINDOWS = {"1 s": 1.0, "3 s": 3.0, "10 s": 10.0}
 """Lengths of the time axis to choose from [s]."""
+
+_REMEMBER = "history.replaceState(null, '', `?axis=${encodeURIComponent(this.value)}`)"
+"""Runs in the browser when an axis is chosen, so that the page shows it again when it is loaded anew."""
 
 _NOISE_SAMPLES = 8192
 """Newest samples from which the noise of the sensor is estimated."""
@@ -64,8 +66,11 @@ class LivePage:
     def __init__(self, document: Document, source: LiveSource) -> None:
         self._document, self._source = document, source
         styles = panel_styles()
-        self._axis = Select(name="axis", title="", options=[], width=150)
+        asked = getattr(document.session_context, "request", None)
+        wanted = asked.arguments.get("axis", [b""])[0].decode(errors="replace") if asked else ""
+        self._axis = Select(name="axis", title="", options=[], value=wanted, width=150)
         self._axis.on_change("value", lambda attribute, old, new: self._chosen())
+        self._axis.js_on_change("value", CustomJS(code=_REMEMBER))
         self._length = Select(name="length", title="", options=list(WINDOWS), value="3 s", width=80)
         self._length.on_change("value", lambda attribute, old, new: self._span())
         self._pause = Toggle(name="pause", label="Pause", width=80)
@@ -96,9 +101,8 @@ class LivePage:
                     column(texts["model"], self._history.layout, name="models", sizing_mode="stretch_width"), "Model"
                 ),
             ),
+            self._tick,
         )
-        self._tick()
-        document.add_periodic_callback(self._tick, TICK)
 
     def _span(self) -> None:
         self._figures.span(-WINDOWS[str(self._length.value)], 0.0)
@@ -109,11 +113,12 @@ class LivePage:
 
     def _state(self) -> AxisState | None:
         axes = self._source.axes()
-        if list(axes) != self._axis.options:
-            self._axis.options = list(axes)
-            self._axis.visible = len(axes) != 1
-        if axes and self._axis.value not in axes:
+        if axes and not self._axis.value:
             self._axis.value = next(iter(axes))
+        options = sorted({*axes, self._axis.value} - {""})
+        if options != self._axis.options:
+            self._axis.options = options
+            self._axis.visible = len(options) != 1
         return axes.get(str(self._axis.value))
 
     def _is_seen(self) -> bool:
@@ -127,7 +132,8 @@ class LivePage:
         self._controls.poll()
         axis = self._state()
         if axis is None:
-            self._texts["state"].text = "<p>No axis was found yet: no node publishes the topic 'samples'.</p>"
+            name = escape(printable(str(self._axis.value))) or "No axis"
+            self._texts["state"].text = f"<p>{name} was not found yet: no node publishes its topic 'samples'.</p>"
             return
         if self._pause.active:
             if self._window is None:  # all kept samples, so that they can be examined in detail

@@ -25,7 +25,6 @@ from ..words import duration
 from . import recording_panels
 from .figures import WindowFigures
 from .layout import Section, lay_out, panel_styles, text_panel
-from .live_page import TICK
 from .sample_window import Window
 
 
@@ -51,6 +50,7 @@ class RecordingPage:
         styles = panel_styles()
         self._state, self._records = text_panel("state", styles), text_panel("records", styles)
         self._records.text = recording_panels.records(comparison)
+        self._chosen()
         figures = self._figures
         lay_out(
             document,
@@ -61,9 +61,8 @@ class RecordingPage:
                 *(Section(drawn, classes="half figure") for drawn in figures.all),
                 Section(self._records, "Phases"),
             ),
+            self._tick,
         )
-        self._chosen()
-        document.add_periodic_callback(self._tick, TICK)
 
     def _chosen(self) -> None:
         index = self._phase.options.index(self._phase.value)

@@ -47,12 +47,13 @@ def nodes(shared_lab, browser):
     model = {"model_file": str(ROOT / "config" / "published_stage.yaml"), "baseline_time": 20.0}
     lab.start("model_node", namespace=AXIS, baseline_folder=str(lab.kept), **model)
     lab.driver(namespace=OTHER, sample_period=PERIOD)
-    page = lab.start("page_node", port=0)
-    url = lab.wait(lambda: re.search(r"http://127\.0\.0\.1:\d+/", page.output), "the address of the page").group()
+    page = lab.page = lab.start("page_node", port=0)
+    url = lab.wait(lambda: re.search(r"http://127\.0\.0\.1:(\d+)/", page.output), "the address of the page")
+    lab.port = int(url.group(1))
     lab.wait(lambda: page.output.count("found the axis") == 2, "both axes")
     predicted = lab.listen(PointCloud2, f"{AXIS}/predicted_samples")
     lab.wait(lambda: predicted, "a prediction")
-    browser.open(url)
+    browser.open(url.group())
     browser.wait(lambda: "idle" in browser.text("phase"), "the phase")
     return lab
 
@@ -135,3 +136,18 @@ def test_a_driver_that_starts_again_as_another_stage_raises_an_alarm_and_is_reca
     assert f"{number.new:.6g}" in browser.text("recalibrations")
     drawn = browser.source("history")
     assert [drawn[c] for c in ("value", "low", "high")] == [[number.new], [number.low], [number.high]]
+
+
+def test_a_page_without_its_program_says_so_and_is_loaded_anew_with_the_same_axis(nodes, browser):
+    """It went on to show the last numbers under a green badge, and its Stop did nothing, also after the restart."""
+    choose(browser, OTHER)
+    browser.wait(lambda: OTHER.strip("/") in browser.value("location.search"), "the axis in the address")
+    nodes.page.signal(signal.SIGKILL)
+    nodes.page.wait()
+    browser.wait(lambda: browser.value("document.getElementById('lost').offsetHeight") > 0, "the notice")
+    assert not browser.value("document.body.classList.contains('live')")
+    nodes.start("page_node", port=nodes.port)
+    browser.wait(lambda: browser.value("document.body?.className") == "live", "the page, loaded anew")
+    browser.wait(lambda: browser.value("Bokeh.documents[0].get_model_by_name('axis').value") == OTHER, "the axis")
+    browser.click("Stop")
+    browser.wait(lambda: f"Stop {OTHER}" in browser.text("answer"), "the answer of the driver")
