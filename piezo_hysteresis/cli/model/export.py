@@ -95,6 +95,10 @@ def run(args: argparse.Namespace) -> int:
     files = (c_program if args.to == "c" else fmus)(model, args.name, inverse)
     _write(files, Path(args.output).expanduser())
     out = console()
+    old = Path(args.output).expanduser() / f"{args.name}_inverse.fmu"
+    if args.to == "fmu" and inverse is None and old.is_file():  # of an earlier model
+        old.unlink()
+        out.print(f"removed {old.name}, which was there before: it is not the inverse of this model")
     out.print(f"wrote {', '.join(files)} to {args.output}")
     out.print(f"sample period: {model.sample_period:g} s; the model takes one sample in every such period")
     if inverse is not None:

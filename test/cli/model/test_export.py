@@ -88,6 +88,15 @@ def test_co_simulation_units_are_written_and_kept(piezo, model, tmp_path):
     assert piezo(*words).status == 2 and piezo(*words, "--force").status == 0
 
 
+def test_no_inverse_of_an_earlier_model_remains_beside_a_unit(piezo, model, tmp_path):
+    words = ("--to", "fmu", "-o", tmp_path / "units")
+    assert piezo("export", model, *words).status == 0
+    soft = model_file.save(MODEL.with_effect(SofteningOfOneMode(k3=0.02)), tmp_path / "soft.yaml")
+    done = piezo("export", soft, *words, "--force")
+    assert done.status == 0 and "removed piezo_inverse.fmu" in done.out, done.err
+    assert [unit.name for unit in (tmp_path / "units").iterdir()] == ["piezo.fmu"]
+
+
 def test_a_failing_compiler_is_reported_in_one_line(piezo, model, tmp_path, monkeypatch):
     (tmp_path / "broken").write_text("#!/bin/sh\necho no licence >&2\nexit 1\n")
     (tmp_path / "broken").chmod(0o755)
