@@ -88,6 +88,7 @@ class Calls:
     def __init__(self, card: Card) -> None:
         self._card, self._turn, self._ended = card, threading.Lock(), threading.Event()
         self._tasks: dict[str, Task] = {}
+        self._started: Task | None = None
 
     def names(self) -> list[str]:
         """Names of the calls."""
@@ -96,12 +97,9 @@ class Calls:
     def count(self, name: str) -> dict[str, float]:
         """Count a call, and return the single faults that occur at it, with their values."""
         with self._turn:
-            return self._card.faults.count(name)
-
-    def underflow(self) -> None:
-        """Stop the card as if its output buffer were empty; always raises CardError."""
-        with self._turn:
-            self._card.underflow()
+            if "underflow" in (struck := self._card.faults.count(name)):
+                self._card.run_dry()
+        return struck
 
     def end(self) -> None:
         """End all waits and tasks; the card keeps its present voltage."""
@@ -155,6 +153,7 @@ class Calls:
             with self._turn:
                 self._require_server()
                 self._card.start(task.rate, task.is_finite)
+                self._started = task
         return {}
 
     def StopTask(self, request: Any) -> dict[str, Any]:
@@ -169,15 +168,19 @@ class Calls:
 
     def WaitUntilTaskDone(self, request: Any) -> dict[str, Any]:
         self._wait(lambda: self._card.left, request.time_to_wait, _NOT_DONE)
-        if not self._task(request).is_finite:
-            self.underflow()  # only so does a task without an end, and without regeneration, end
+        if not self._task(request).is_finite:  # only so does a task without an end, and without regeneration, end
+            with self._turn:
+                self._card.run_dry()
+                self._card.require_output()
         return {}
 
     def WriteAnalogF64(self, request: Any) -> dict[str, Any]:
-        values = np.array(request.write_array)
+        values, task = np.array(request.write_array), self._task(request)
         with self._turn:
             self._require_server()
-            if self._task(request).rate:
+            if task is self._started:
+                self._card.require_output()
+            if task.rate:
                 self._card.write(values)
             else:
                 self._card.set(float(values[-1]))
@@ -192,10 +195,8 @@ class Calls:
     def ReadAnalogF64(self, request: Any) -> dict[str, Any]:
         task = self._task(request)
         wanted = request.num_samps_per_chan
-        if task.rate and wanted < 0 and not task.is_finite:
-            wanted = self._card.available
-        elif wanted < 0:
-            wanted = task.samples
+        if wanted < 0:
+            wanted = self._card.available if task.rate and not task.is_finite else task.samples
         if task.rate:
             self._wait(lambda: self._card.remaining(wanted), request.timeout, _TIMEOUT)
         with self._turn:

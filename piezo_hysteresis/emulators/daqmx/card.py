@@ -19,7 +19,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 
 import numpy as np
 
@@ -94,7 +93,7 @@ class Card:
         self._acquired: Samples = np.empty((len(INPUTS), 0))
         self._echo: Samples = np.zeros(_LOOP_BACK_DELAY)
         self._position = 0.0
-        self.is_running = False
+        self.is_running, self._is_dry = False, False
 
     @property
     def voltage(self) -> float:
@@ -122,13 +121,12 @@ class Card:
         """Start the clock at `rate` [Hz]. A finite run ends with the buffer; any other fails if it becomes empty."""
         self._stage.configure(1 / rate)
         self._acquired, self._played = np.empty((len(INPUTS), 0)), 0
-        self._begin, self.is_running, self._is_finite = time.monotonic(), True, is_finite
+        self._begin, self.is_running, self._is_finite, self._is_dry = time.monotonic(), True, is_finite, False
 
     def stop(self) -> None:
         """Stop the clock, also after a run that has ended; the output keeps its voltage."""
-        with suppress(CardError):
-            self._advance()
-        self.is_running, self._buffer = False, np.empty(0)
+        self._advance()
+        self.is_running, self._is_dry, self._buffer = False, False, np.empty(0)
 
     def write(self, voltage: Samples) -> None:
         """Append voltages (n,) to the output buffer [V]; CardError if one is out of range."""
@@ -146,16 +144,15 @@ class Card:
 
     def look(self, channels: Sequence[str]) -> Samples:
         """One reading of each channel [V], without a clock; shape (channels, 1)."""
-        with suppress(CardError):  # the writer gets the error of an empty buffer
-            self._advance()
+        self._advance()
         return self._chosen(self._run(np.full(1, self.voltage)), channels)
 
     def remaining(self, count: int) -> float:
-        """Time until `count` samples can be read [s]; infinite if a finite run has fewer. CardError if none runs."""
-        if not self.is_running and not self._is_finite:
-            raise CardError(NOT_RUNNING, "The specified task is not running.")
+        """Time until `count` samples can be read [s]; infinite if a run has fewer that ends. CardError if none runs."""
         missing = count - self.available
-        if missing > self._buffer.size and self._is_finite:
+        if not (self.is_running or self._is_finite or self._is_dry):
+            raise CardError(NOT_RUNNING, "The specified task is not running.")
+        if missing > self._buffer.size and (self._is_finite or self._is_dry):
             return math.inf
         return max(missing, 0) * self._stage.sample_period / self._speed if missing > 0 else 0.0
 
@@ -164,10 +161,17 @@ class Card:
         taken, self._acquired = self._acquired[:, :count], self._acquired[:, count:]
         return self._chosen(taken, channels)
 
-    def underflow(self) -> None:
-        """Stop the clock as if the output buffer were empty; always raises CardError."""
-        self.is_running = False
-        raise CardError(UNDERFLOW, "The generation has stopped to prevent the regeneration of old samples.")
+    def run_dry(self) -> None:
+        """Play the output buffer to its end, as if the computer had been away for that long."""
+        if self.is_running:
+            self._play(self._buffer.size)
+            self._end()
+
+    def require_output(self) -> None:
+        """CardError after the output buffer has become empty in a run without an end."""
+        self._advance()
+        if self._is_dry:
+            raise CardError(UNDERFLOW, "The generation has stopped to prevent the regeneration of old samples.")
 
     def _chosen(self, inputs: Samples, channels: Sequence[str]) -> Samples:
         return inputs[[INPUTS.index(channel) for channel in channels]]
@@ -182,12 +186,20 @@ class Card:
             elapsed = (time.monotonic() - self._begin) * self._speed
             due = int(elapsed / self._stage.sample_period) - self._played
         late = due > self._buffer.size
+        self._play(due)
+        if late:
+            self._end()
+
+    def _play(self, due: int) -> None:
         block, self._buffer = self._buffer[:due], self._buffer[due:]
         if block.size:
             self._acquired = np.concatenate((self._acquired, self._run(block)), axis=1)
             self._played += block.size
-        if late and not self._is_finite:
-            self.underflow()
+
+    def _end(self) -> None:
+        """End a run without an end, whose clock stops with an empty buffer; a finite run is ended by its task."""
+        if not self._is_finite:
+            self.is_running, self._is_dry = False, True
 
     def _run(self, voltage: Samples) -> Samples:
         """Output voltages (n,) [V], and return the inputs meanwhile [V], shape (4, n)."""

@@ -112,8 +112,6 @@ class DaqmxServer:
             raise CardError(*_RESOURCE_LOST)
         if "late" in struck:
             raise CardError(*_LATE)
-        if "underflow" in struck:
-            self._calls.underflow()
 
     def _spoil(self, values: dict[str, Any], struck: dict[str, float]) -> None:
         read = values["read_array"]

@@ -14,6 +14,7 @@
 
 """Whatever fails: one clear error, the safe voltage where the link allows, and what is not known is said."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -103,9 +104,9 @@ def test_a_lost_link_leaves_the_voltage_unknown_and_is_reported(rig, streamed, s
     r.stage.close()
 
 
-def blind(rig, *faults):
+def blind(rig, *faults, speed=math.inf):
     """A card that does not report its output, and every voltage that it puts out from now on."""
-    r = rig(*faults, reads_back=False, voltage_input="", assume_safe=True, max_slew_rate=1000.0)
+    r = rig(*faults, speed=speed, reads_back=False, voltage_input="", assume_safe=True, max_slew_rate=1000.0)
     exchange, wire = r.card._stage.exchange, [0.0]
 
     def kept(voltage):
@@ -136,6 +137,16 @@ def test_a_card_that_does_not_report_its_output_goes_down_from_the_last_voltage_
     assert np.abs(np.diff(wire)).max() <= 1000.0 * r.stage.sample_period + 20.0 / 2**16, "one step of the converter"
     streamed(r.stage, WAVE, *BLOCKS)
     r.stage.close()
+
+
+@pytest.mark.parametrize("call", ["WriteAnalogF64", "ReadAnalogF64"])
+def test_an_output_runs_dry_only_after_all_that_was_written(rig, streamed, call):
+    """The emulated card stopped with a full buffer: on the way down from what was written, its output jumped."""
+    r, wire = blind(rig, f"underflow@{call}:4", speed=1.0)
+    with pytest.raises(StageError, match=r"generation has stopped.*safe voltage, 0 V"):
+        streamed(r.stage, WAVE, *BLOCKS)
+    assert wire[-1] == 0.0
+    assert np.abs(np.diff(wire)).max() <= 1000.0 * r.stage.sample_period + 20.0 / 2**16, "one step of the converter"
 
 
 @pytest.mark.parametrize("fault", ["error@WriteAnalogF64:4", "link_lost@WriteAnalogF64:4"])
