@@ -16,12 +16,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from .errors import ParameterError
 
 
-def in_home(path: str | Path) -> Path:
+def in_home(path: str | os.PathLike[str]) -> Path:
     """The path with ``~`` or ``~user`` at its beginning replaced by the home folder.
 
     Raises

@@ -19,11 +19,11 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field
 from functools import cache
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 from ..errors import RecordingError, printable
+from ..home_path import in_home
 from .extra import package
 
 
@@ -55,7 +55,7 @@ class Storage:
             bucket = url.removeprefix("s3://").partition("/")[0]
             return _s3(bucket, self.endpoint, self.anonymous), url[5:].rstrip("/")
         if not scheme:
-            return _disk(), str(Path(url).expanduser().absolute())
+            return _disk(), str(in_home(url).absolute())
         fsspec = package("fsspec")
         try:
             fs, path = fsspec.core.url_to_fs(url)

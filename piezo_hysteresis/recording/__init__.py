@@ -52,6 +52,7 @@ from functools import partial
 from pathlib import Path
 
 from ..errors import RecordingError
+from ..home_path import in_home
 from ..record import Experiment, Notice, Record
 from .bag.bag import Bag
 from .bag.bag_writer import BagWriter
@@ -126,7 +127,7 @@ def read(
     records: list[Record] = []
     notices: list[Notice] = []
     for path in paths:
-        place = Path(path).expanduser()
+        place = in_home(path)
         chosen = _format(place, format)
         if axis is not None and not isinstance(chosen, Rosbag2):
             raise RecordingError(f"{path}: `axis`: got '{axis}', expected none; only a bag has namespaces of stages")
@@ -139,7 +140,7 @@ def read(
     if unknown := set(decimate or ()) - names:
         held = ", ".join(dict.fromkeys(r.phase for r in records))
         raise RecordingError(f"{paths[0]}: `decimate`: no phase {min(unknown)!r}, expected one of {held}")
-    experiment = Experiment(tuple(records), ", ".join(str(Path(path).expanduser()) for path in paths))
+    experiment = Experiment(tuple(records), ", ".join(str(in_home(path)) for path in paths))
     return experiment.noting(*notices, *inspect(experiment, options.units.get("displacement")))
 
 
@@ -207,7 +208,7 @@ def write(experiment: Experiment, path: str | os.PathLike[str], *, format: str |
     RecordingError
         If the format or the path cannot be written.
     """
-    place = Path(path).expanduser()
+    place = in_home(path)
     chosen = _named(format or _BY_SUFFIX.get(place.suffix.lower(), "npz"))
     if not isinstance(chosen, WritableFormat):
         raise RecordingError(f"{place}: format '{format}' is only read; expected npz, csv, mat or rosbag2")

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
+from ..home_path import in_home
 from .table.column_inference import inferred_columns, named_column, unit_in
 from .table.dialect import decoded
 from .table.units import si_factor
@@ -48,7 +49,7 @@ def read_path(path: str | Path) -> tuple[Array, float | None]:
     RecordingError
         If there is no such file, no displacement in it, several columns without times, or times that are not even.
     """
-    place = Path(path).expanduser()
+    place = in_home(path)
     try:
         return _from_npz(place) if place.suffix == ".npz" else _from_csv(place)
     except OSError as error:

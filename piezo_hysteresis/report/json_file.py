@@ -19,10 +19,10 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from ..errors import RecordingError
+from ..home_path import in_home
 
 
 def write_json(path: str, answer: Mapping[str, Any]) -> None:
@@ -33,7 +33,7 @@ def write_json(path: str, answer: Mapping[str, Any]) -> None:
     RecordingError
         If the file cannot be written.
     """
-    place = Path(path).expanduser()
+    place = in_home(path)
     text = json.dumps(_plain(answer), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     try:
         if place.exists() and not place.is_file():  # a pipe or /dev/stdout cannot be replaced
@@ -54,8 +54,9 @@ def read_json(path: str) -> dict[str, Any]:
     RecordingError
         If there is no such file, or it is not a JSON object.
     """
+    place = in_home(path)
     try:
-        answer = json.loads(Path(path).expanduser().read_text(encoding="utf-8"))
+        answer = json.loads(place.read_text(encoding="utf-8"))
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}, expected a JSON file") from None
     except (ValueError, RecursionError):

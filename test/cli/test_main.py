@@ -115,9 +115,22 @@ def files(tmp_path_factory, folder):
     return {**{p.name.partition(".")[0]: p for p in place.iterdir()}, "experiment": folder, "place": place}
 
 
+NOBODY = "there is no home folder of that user, expected another path"
+
+
 @pytest.mark.parametrize(
     ("line", "words"),
     [
+        ("simulate -o ~no_such_user/x", NOBODY),
+        ("simulate -o {place}/x --plant ~no_such_user/x", NOBODY),
+        ("identify {experiment} -o {place}/x.yaml --json ~no_such_user/x", NOBODY),
+        ("validate {fine} ~no_such_user/x", NOBODY),
+        ("validate {fine} {experiment} --figures ~no_such_user/x", NOBODY),
+        ("diagnose --stage ~no_such_user/x -o {place}/x", NOBODY),
+        ("compensate {fine} ~no_such_user/x", NOBODY),
+        ("history ~no_such_user/x", NOBODY),
+        ("report {experiment} --answer ~no_such_user/x", NOBODY),
+        ("fleet {experiment} -o ~no_such_user/x", NOBODY),
         ("validate {place}/none.yaml {experiment}", "expected a model file"),
         ("validate {broken} {experiment}", "broken.yaml"),
         ("validate {extra} {experiment}", "gama"),

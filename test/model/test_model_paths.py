@@ -15,9 +15,11 @@
 """Files of models are read without waiting, and a path that cannot be is one clear line."""
 
 import os
+from pathlib import Path
 
 import pytest
 
+import piezo_hysteresis
 from piezo_hysteresis.errors import ModelError, ParameterError
 from piezo_hysteresis.home_path import in_home
 from piezo_hysteresis.model import axes_file, model_file
@@ -29,6 +31,12 @@ def test_a_pipe_is_refused_and_not_waited_for(tmp_path, load):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(ModelError, match="expected a"):
         load(tmp_path / "pipe")
+
+
+def test_one_function_looks_for_home_folders():
+    """`Path.expanduser` ends with an error of its own where there is no such user."""
+    package = Path(piezo_hysteresis.__file__).parent
+    assert [f.name for f in package.rglob("*.py") if "expanduser(" in f.read_text()] == ["home_path.py"]
 
 
 def test_the_home_of_nobody_is_refused_in_one_line():

@@ -29,6 +29,7 @@ import numpy as np
 
 from ...compensation import Limits, Plan, plan
 from ...errors import ModelError, RecordingError
+from ...home_path import in_home
 from ...model import model_file
 from ...recording.wanted_path import read_path
 from ...recording.whole_file import whole_file
@@ -117,11 +118,11 @@ def run(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_json(args.json, answer(found))
     if args.figures is not None:
-        _draw(found, Path(args.figures).expanduser())
+        _draw(found, in_home(args.figures))
     if args.report is not None:
         from ...report.plan_page import plan_page
 
-        plan_page(found, model, args.path).save(Path(args.report).expanduser())
+        plan_page(found, model, args.path).save(in_home(args.report))
     show(plan_table(found))
     out = console()
     if resampled:
@@ -135,7 +136,7 @@ def run(args: argparse.Namespace) -> int:
     if not found.reachability.is_whole and not args.allow_partial:
         out.print("no command was written; change the path, or give --allow-partial to write what the limits allow")
         return 1
-    _save(found, Path(args.output).expanduser())
+    _save(found, in_home(args.output))
     out.print(f"wrote {args.output}")
     return 0 if found.reachability.is_whole else 1
 

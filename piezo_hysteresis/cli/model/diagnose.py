@@ -17,11 +17,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from ...discrepancy import Diagnosis, diagnose
 from ...discrepancy.choice.live_diagnosis import LiveDiagnosis
 from ...errors import IdentificationError, ParameterError
+from ...home_path import in_home
 from ...identification.records.conditioning_split import NOT_USED
 from ...model import model_file
 from ...report.figures.comparison import compare_diagnosis
@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     if args.report is not None:
         with progress("report") as report_progress:
             drawn = page(compare_diagnosis(found), fit=found.fit, answer=answer, progress=report_progress)
-        drawn.save(Path(args.report).expanduser())
+        drawn.save(in_home(args.report))
     out = console()
     said = answer_verdict(answer)
     out.print(said.headline, style="bold")

@@ -34,6 +34,7 @@ from ...errors import ModelError
 from ...export import c_program, fmus
 from ...export.fmu import compiler
 from ...export.inversion import inversion
+from ...home_path import in_home
 from ...model import model_file
 from ...model.model import Model
 from ..options.destination import add_force, require_new_folder
@@ -93,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     model = model_file.load(args.model)
     inverse, why_not = _inverse(model, args)
     files = (c_program if args.to == "c" else fmus)(model, args.name, inverse)
-    _write(files, Path(args.output).expanduser())
+    _write(files, in_home(args.output))
     out = console()
     old = Path(args.output).expanduser() / f"{args.name}_inverse.fmu"
     if args.to == "fmu" and inverse is None and old.is_file():  # of an earlier model

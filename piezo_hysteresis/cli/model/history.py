@@ -23,6 +23,7 @@ from rich.table import Table
 
 from ...changes.recalibration_history import FILE, read_numbers
 from ...errors import RecordingError
+from ...home_path import in_home
 from ..options.destination import add_force, require_new_results
 from ..terminal import console
 
@@ -45,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         If there is no history, or the figure cannot be written.
     """
     require_new_results(args)
-    path = args.file.expanduser()
+    path = in_home(args.file)
     path = path / FILE if path.is_dir() else path
     try:
         numbers = read_numbers(path.read_text(encoding="utf-8"), str(path))
@@ -70,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     if args.output is not None:
         from ...report.recalibrations import recalibrations
 
-        picture = Path(args.output).expanduser()
+        picture = in_home(args.output)
         recalibrations(numbers).save_picture(picture)
         out.print(f"wrote {picture}")
     return 0

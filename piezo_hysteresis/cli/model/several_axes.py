@@ -19,12 +19,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import IdentificationError, ModelError, ParameterError
+from ...home_path import in_home
 from ...identification.identify_axes import LENGTH, AxisError, axes_errors, identify_axes
 from ...identification.records.roles import HELD_OUT
 from ...model import axes_file
@@ -45,7 +45,7 @@ def identify(experiment: Experiment, args: argparse.Namespace) -> int:
     PiezoError
         On an output that does not end in .npz, an option for one axis, or data that do not determine the model.
     """
-    path = Path("model.npz" if args.output == "model.yaml" else args.output).expanduser()
+    path = in_home("model.npz" if args.output == "model.yaml" else args.output)
     require_new_file("-o", str(path), args.force)
     first = experiment[0]
     channels = ", ".join((*names(first, "voltage"), *names(first, "displacement")))

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import RecordError
+from ...home_path import in_home
 from ...identification.free_run_error import Errors, free_per_record
 from ...identification.identified_range import outside
 from ...identification.records.comparable import comparable
@@ -73,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_json(args.json, answer(comparison, now, tests))
     if args.figures is not None:
-        _draw(comparison, Path(args.figures).expanduser())
+        _draw(comparison, in_home(args.figures))
     show(error_table(comparison), frequency_table(comparison), _test_table(tests))
     beyond = outside(model, experiment)
     show_notices((*experiment.notices, *conditioned, *beyond))

@@ -24,6 +24,7 @@ import os
 from pathlib import Path
 
 from ...errors import RecordingError
+from ...home_path import in_home
 
 
 def add_results(parser: argparse.ArgumentParser, **contents: str) -> None:
@@ -63,7 +64,7 @@ def require_new_results(args: argparse.Namespace) -> None:
     for option, name in (("-o", "output"), ("--report", "report"), ("--json", "json")):
         path = getattr(args, name, None)
         require_new_file(option, path, args.force)
-        if path is not None and (other := taken.setdefault(Path(path).expanduser().absolute(), option)) != option:
+        if path is not None and (other := taken.setdefault(in_home(path).absolute(), option)) != option:
             raise RecordingError(f"{option}: got {path} as for {other}, expected another file")
     require_new_folder("--figures", getattr(args, "figures", None), args.force)
 
@@ -87,7 +88,7 @@ def require_new_file(option: str, path: str | None, force: bool | None = None) -
     """
     if path is None:
         return
-    place = Path(path).expanduser()
+    place = in_home(path)
     if place.exists() and not (force and place.is_file()):
         way_out = "remove it" if force is None or not place.is_file() else "give --force to replace it"
         raise RecordingError(f"{option}: {place} exists already, expected a new file; choose another name or {way_out}")
@@ -110,7 +111,7 @@ def require_new_experiment(option: str, path: str) -> None:
     RecordingError
         If it exists and is not an empty folder, or cannot be made.
     """
-    place = Path(path).expanduser()
+    place = in_home(path)
     place = place.with_suffix("") if place.suffix == ".mcap" else place
     empty = place.is_dir() and place.suffix not in (".csv", ".mat") and not any(place.iterdir())
     if (place.exists() or place.is_symlink()) and not empty:
@@ -139,7 +140,7 @@ def require_new_folder(option: str, path: str | None, force: bool) -> None:
     """
     if path is None:
         return
-    place = Path(path).expanduser()
+    place = in_home(path)
     if place.exists() and not place.is_dir():
         raise RecordingError(f"{option}: {place} is a file, expected a folder; choose another name")
     if place.is_dir() and any(place.iterdir()) and not force:

@@ -17,10 +17,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from ...errors import ParameterError
+from ...home_path import in_home
 from ...stage.hidden import hidden_effect
 from ...stage.plant import PlantParameters
 from ...yaml_file import read_yaml
@@ -59,7 +59,7 @@ def plant(args: argparse.Namespace) -> tuple[PlantParameters, dict[str, Any]]:
 def _read(path: str | None) -> PlantParameters:
     if path is None:
         return PlantParameters()
-    mapping = read_yaml(Path(path).expanduser())
+    mapping = read_yaml(in_home(path))
     if not isinstance(mapping, dict):
         raise ParameterError(f"{path}: got a {type(mapping).__name__}, expected part.quantity: value")
     return PlantParameters.from_mapping(mapping)

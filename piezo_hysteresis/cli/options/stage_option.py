@@ -30,6 +30,7 @@ from ...acquisition.settings import DriverSettings
 from ...discrepancy.choice.live_diagnosis import LiveDiagnosis, begin
 from ...discrepancy.choice.time_to_decide import ERROR_RATE, LONGEST
 from ...errors import ParameterError
+from ...home_path import in_home
 from ...identification.protocol.protocol import Protocol
 from ...record import Experiment, Record
 from ...report.tables.probability_table import probability_table
@@ -86,7 +87,7 @@ def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
     if args.output is None:
         raise ParameterError("diagnose --stage: got no -o, expected the folder of the experiment to write")
     require_new_experiment("-o", args.output)
-    path = Path(args.stage).expanduser()
+    path = in_home(args.stage)
     settings, values = _settings(path)
     records: list[Record] = []
     try:

@@ -32,6 +32,7 @@ from ...fleet.source import NamePattern
 from ...fleet.storage import Storage
 from ...fleet.table.results import Results
 from ...fleet.work import TASKS, work_for
+from ...home_path import in_home
 from ...model import model_file
 from ..options import reading_options
 from ..options.destination import add_force, require_new_file
@@ -102,13 +103,13 @@ def run(args: argparse.Namespace) -> int:
     require_new_file("--report", args.report, args.force)
     if not args.urls and args.report is None:
         raise ParameterError("fleet: got no URL and no --report, expected recordings or the page to write")
-    folder = Path(args.output).expanduser()
+    folder = in_home(args.output)
     without = _worked(args, folder) if args.urls else 0
     if args.report is not None:
         from ...fleet.table.results_history import results_history
         from ...report.fleet.fleet_page import fleet_page
 
-        fleet_page(results_history(folder, args.task)).save(Path(args.report).expanduser())
+        fleet_page(results_history(folder, args.task)).save(in_home(args.report))
         console().print(f"wrote {args.report}")
     return 1 if without else 0
 

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from ... import recording
 from ...errors import RecordingError
+from ...home_path import in_home
 from ...identification.records.noise_floor import noise_floors
 from ...record import Experiment
 from ...report.json_file import write_json
@@ -61,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     experiment = reading_options.read(args, rows_before=0)
     show(record_table(experiment, noise_floors(experiment.records)), notice_table(experiment))
     if args.preview is not None:
-        _show_preview(experiment, Path(args.preview).expanduser())
+        _show_preview(experiment, in_home(args.preview))
     if args.output is not None:
         recording.write(experiment, args.output)
         console().print(f"wrote {len(experiment)} phases to {args.output}")

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import ParameterError, RecordingError
+from ...home_path import in_home
 from ...identification.free_run_error import free_per_record
 from ...identification.records.comparable import comparable
 from ...model import model_file
@@ -83,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     )
     with progress("report") as report_progress:
         drawn = page(compare(experiment, models, nuisances), answer=answer, title=args.title, progress=report_progress)
-    path = Path(args.output).expanduser()
+    path = in_home(args.output)
     drawn.save(path)
     console().print(f"wrote {path} and {len(drawn.drawings)} figures beside it")
     return 0

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ...errors import ParameterError, printable
+from ...home_path import in_home
 
 Number = TypeVar("Number", int, float)
 
@@ -82,7 +83,7 @@ def parameter_file(name: str, text: str) -> list[str]:
     """
     if not text:
         return []
-    path = Path(text).expanduser()
+    path = in_home(text)
     if not path.is_file():
         raise ParameterError(f"{name}: got '{printable(text)}', expected a file that exists")
     return [str(path)]

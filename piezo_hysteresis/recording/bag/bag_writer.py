@@ -28,6 +28,7 @@ from mcap.writer import CompressionType, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from ...errors import RecordingError
+from ...home_path import in_home
 from ..checks.error_context import naming
 from .written_file import check_in_place
 
@@ -69,7 +70,7 @@ class BagWriter:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path).expanduser()
+        self.path = in_home(path)
         self._file = self.path / f"{self.path.name}_0.mcap"
         self._typestore = get_typestore(Stores.ROS2_KILTED)
         self._schemas: dict[str, int] = {}

@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RecordingError
+from ...home_path import in_home
 from ...parameter import parts_of
 from ...record import Experiment, Notice, Record
 from ..checks.error_context import naming
@@ -116,7 +117,7 @@ def recorded_model(path: str | Path, *, axis: str | None = None) -> str | None:
     RecordingError
         If the path is no bag.
     """
-    place = Path(path).expanduser()
+    place = in_home(path)
     text = None
     with naming(place, "a rosbag2 bag"):
         for message in Bag(place).messages():

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import RecordingError, StageError
+from ...home_path import in_home
 from ...parameter import Parameter, Row, Setting
 from ...yaml_file import read_yaml
 from ..hidden import hidden_effect
@@ -67,7 +68,7 @@ def open(values: Mapping[str, Any], opening: Opening) -> Stage:
 
 def _plant_values(values: Mapping[str, Any]) -> Mapping[str, Any]:
     if values["plant_file"]:
-        return _read_mapping(Path(values["plant_file"]).expanduser())
+        return _read_mapping(in_home(values["plant_file"]))
     changed = {row.name: values[row.name] for row in _PLANT if values[row.name] != row.value}
     return {"hysteresis.operator": values["hysteresis.operator"], **changed}
 
