@@ -33,7 +33,7 @@ from ..model.sample_periods import identified_periods
 from ..record import Notice, Record
 from .fit.fit import Fit, Progress
 from .fit.form_uncertainty import ADEQUACY, with_form_uncertainty
-from .fit.joint import fit_dynamics, fit_lag, without_intersample_error
+from .fit.joint import fit_dynamics, fit_joint, fit_lag, without_intersample_error
 from .fit.normal_equations import Nuisance, residuals
 from .identification import INSEPARABLE, Identification, correlated_pairs, phase_errors, undetermined
 from .identified_range import LAG_ERROR, identified_range
@@ -184,8 +184,10 @@ def identify(
                 )
             )
         notices += more_notices
-        joint, records, more_notices = without_intersample_error(joint, records, floors, roles.fitted)
+        corrected, more_notices = without_intersample_error(joint.model, records, floors, roles.fitted)
         notices += more_notices
+        if corrected is not records:
+            records, joint = corrected, fit_joint(joint.model, corrected, floors, roles.fitted)
         used = records, floors, roles.fitted
         noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
         comparisons, more_notices = compare_inputs(joint.model, records, noise, samples, chosen)
@@ -201,6 +203,11 @@ def identify(
         report("joint fit", 0.3)
         used = steps_apart(records, floors, roles.fitted)
         joint = fit_lag(start, *used)
+        corrected, more_notices = without_intersample_error(joint.model, records, floors, roles.fitted)
+        notices += more_notices
+        if corrected is not records:
+            records, used = corrected, steps_apart(corrected, floors, roles.fitted)
+            joint = fit_lag(joint.model, *used)
     if memory and roles.broadband:
         report("memory of the hysteresis", 0.9)
         joint, more_notices = choose_memory(joint, records, floors, roles.fitted, roles.loops)

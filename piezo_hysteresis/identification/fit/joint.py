@@ -103,24 +103,22 @@ def fit_joint(
 
 
 def without_intersample_error(
-    joint: Fit, records: tuple[Record, ...], floors: Sequence[float], fitted: Collection[int]
-) -> tuple[Fit, tuple[Record, ...], tuple[Notice, ...]]:
-    """The fit of `fit_joint` repeated without the inter-sample error of averaged records, and these without it.
+    model: Model, records: tuple[Record, ...], floors: Sequence[float], fitted: Collection[int]
+) -> tuple[tuple[Record, ...], tuple[Notice, ...]]:
+    """The records without the inter-sample error of averages; the same tuple if those that are fitted have none.
 
     The averages of a drive do not reach its turns, which loop and dynamics would describe by a later and wider loop.
     A notice names the records in which this is more than the floor.
     """
     try:
-        lost = intersample_error(joint.model, records)
+        lost = intersample_error(model, records)
     except DivergenceError:  # on a record that moves further than those that were fitted
-        return joint, records, ()
+        return records, ()
     if not any(lost[i].any() for i in fitted):
-        return joint, records, ()
-    records = less(records, lost)
+        return records, ()
     phases = dict.fromkeys(records[i].phase for i in fitted if np.std(lost[i]) > floors[i])
     message = f"{' and '.join(phases)} were stored as averages: the turns of the drive between samples were allowed for"
-    notices = (Notice("intersample_error", message),) if phases else ()
-    return fit_joint(joint.model, records, floors, fitted), records, notices
+    return less(records, lost), (Notice("intersample_error", message),) if phases else ()
 
 
 def fit_dynamics(
