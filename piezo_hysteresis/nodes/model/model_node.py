@@ -73,8 +73,11 @@ class ModelNode(GuardedNode):
         self._diagnostics = ModelDiagnostics(self, ResidualAlarm(self._values), self._changes)
         self._recalibrator = Recalibrator(self, self._changes, self._follow)
         if self._values["model_file"]:
-            self._load(self._values["model_file"])
-        let_change(self, MODEL, "model_file", self._usable, self._load)
+            try:
+                self._follow(self._usable(self._values["model_file"]))
+            except PiezoError as error:
+                self._diagnostics.refused(f"model_file: {error}")
+        let_change(self, MODEL, "model_file", self._usable, self._follow)
         subscribe(self, "model", self._on_model)
         subscribe(self, "samples", self._on_samples, deep=True, raw=True)
         self.create_service(Trigger, "~/zero", self._on_zero)
@@ -142,17 +145,12 @@ class ModelNode(GuardedNode):
         """End a running fit."""
         self._recalibrator.end()
 
-    def _usable(self, path: str) -> None:
-        """Raise PiezoError for a file without a model, or with one that is too slow for the stream."""
+    def _usable(self, path: str) -> Model:
+        """The model in a file; raises PiezoError if there is none, or if it is too slow for the stream."""
         model = load(path)
         if self._predictor is not None:
             model.at(self._predictor.sample_period)
-
-    def _load(self, path: str) -> None:
-        try:
-            self._follow(load(path))
-        except PiezoError as error:
-            self._diagnostics.refused(f"model_file: {error}")
+        return model
 
     def _follow(self, model: Model, offset: float | None = None) -> None:
         if self._predictor is not None:

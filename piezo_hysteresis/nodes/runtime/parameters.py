@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
@@ -26,6 +26,8 @@ from rclpy.parameter import Parameter as RosParameter
 
 from ...errors import ParameterError, PiezoError
 from ...parameter import Row, Setting
+
+Content = TypeVar("Content")
 
 
 def declare(node: Node, rows: Iterable[Row], prefix: str = "", *, read_only: bool = False) -> None:
@@ -75,7 +77,7 @@ def read(node: Node, rows: Iterable[Row], prefix: str = "") -> dict[str, Any]:
 
 
 def let_change(
-    node: Node, rows: Iterable[Row], name: str, load: Callable[[str], object], changed: Callable[[str], None]
+    node: Node, rows: Iterable[Row], name: str, load: Callable[[str], Content], changed: Callable[[Content], None]
 ) -> None:
     """Let the path `name` be changed while the node runs. The other rows cannot be changed after the start.
 
@@ -89,15 +91,17 @@ def let_change(
     load : callable
         Reads the file before its path is accepted; it raises PiezoError to refuse it.
     changed : callable
-        Called with every accepted path.
+        Called with what was read from every accepted file, which is not read again: it may have changed.
     """
     by_name = {row.name: row for row in rows}
+    content: list[Content] = []
 
     def check(parameters: list[RosParameter]) -> SetParametersResult:
+        content.clear()
         try:
             for parameter in parameters:
                 if parameter.name == name:
-                    load(str(by_name[name].check(parameter.value)))
+                    content.append(load(str(by_name[name].check(parameter.value))))
                 elif parameter.name in by_name:
                     raise ParameterError(f"{parameter.name} is read at start; give it then")
         except PiezoError as error:
@@ -105,9 +109,8 @@ def let_change(
         return SetParametersResult(successful=True)
 
     def apply(parameters: list[RosParameter]) -> None:
-        for parameter in parameters:
-            if parameter.name == name:
-                changed(parameter.value)
+        if any(parameter.name == name for parameter in parameters):
+            changed(content[-1])
 
     node.add_on_set_parameters_callback(check)
     node.add_post_set_parameters_callback(apply)

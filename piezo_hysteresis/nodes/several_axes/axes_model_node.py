@@ -72,8 +72,11 @@ class AxesModelNode(GuardedNode):
         self._joiner: AxesJoiner | None = None
         self._predictor: AxesPredictor | None = None
         if self._values["model_file"]:
-            self._load(self._values["model_file"])
-        let_change(self, AXES, "model_file", self._usable, self._load)
+            try:
+                self._follow(self._usable(self._values["model_file"]))
+            except PiezoError as error:
+                self._diagnostics.refused(f"model_file: {error}")
+        let_change(self, AXES, "model_file", self._usable, self._follow)
         self.create_service(Trigger, "~/zero", self._on_zero)
         self.get_logger().info(f"{LISTENING} of {', '.join(stream.name for stream in self._streams)}")
 
@@ -139,16 +142,11 @@ class AxesModelNode(GuardedNode):
                 require_period(stream.period, model.sample_period)
         return model
 
-    def _load(self, path: str) -> None:
-        try:
-            model = self._usable(path)
-            joiner = AxesJoiner(len(self._streams), model.sample_period)
-        except PiezoError as error:
-            self._diagnostics.refused(f"model_file: {error}")
-            return
+    def _follow(self, model: AxesModel) -> None:
         self._compile(model)
         self._number = first_bits(axes_file.content_hash(model))
-        self._joiner, self._predictor = joiner, AxesPredictor(model, self._values["rms_time"])
+        self._joiner = AxesJoiner(len(self._streams), model.sample_period)
+        self._predictor = AxesPredictor(model, self._values["rms_time"])
         self._diagnostics.follow(self._joiner, self._predictor)
 
     def _compile(self, model: AxesModel) -> None:
