@@ -35,7 +35,7 @@ SILENT_WINDOW = 10.0
 """Time between two questions whether a window is still there, and time that it has for the answer [s]."""
 
 LARGEST_BODY = 1 << 16
-"""Size of a request at most [bytes]."""
+"""Size of a request, and of a message of a window, at most [bytes]."""
 
 
 class BoundedServer(HTTPServer):
@@ -70,7 +70,8 @@ class BoundedServer(HTTPServer):
 class BoundedTornado(BokehTornado):
     """Serves a limited number of windows, and ends those that do not answer any more.
 
-    What is sent to a window that does not read would otherwise be kept in memory for ever.
+    What is sent to a window that does not read would otherwise be kept in memory for ever. What a window sends is a
+    press or a choice. Bokeh would write more, which it does not understand, into the log.
 
     Parameters
     ----------
@@ -82,7 +83,11 @@ class BoundedTornado(BokehTornado):
 
     def __init__(self, applications: dict[str, Any], **options: Any) -> None:
         super().__init__(
-            applications, websocket_ping_interval=SILENT_WINDOW, websocket_ping_timeout=SILENT_WINDOW, **options
+            applications,
+            websocket_ping_interval=SILENT_WINDOW,
+            websocket_ping_timeout=SILENT_WINDOW,
+            websocket_max_message_size_bytes=LARGEST_BODY,
+            **options,
         )
 
     def new_connection(self, protocol: Any, socket: Any, application_context: Any, session: Any) -> Any:

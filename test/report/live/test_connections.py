@@ -19,7 +19,7 @@ from __future__ import annotations
 import base64
 import socket
 import urllib.request
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 
 import pytest
 from bokeh.models import Div
@@ -114,3 +114,16 @@ def test_a_window_too_many_is_refused_and_the_others_stay(monkeypatch):
         first.settimeout(0.05)
         with pytest.raises(TimeoutError):
             rest_of(first)
+
+
+def test_a_window_that_sends_very_much_is_ended_and_the_log_stays_short(caplog):
+    """20 MB of brackets were 20 MB in the log of the node."""
+    with page() as server, ExitStack() as stack:
+        one, read = window(stack, server), b""
+        while b"ACK" not in read:
+            read += one.recv(1 << 16)
+        with suppress(ConnectionError):  # it is ended at once
+            for text in (b'{"msgid": "1", "msgtype": "PATCH-DOC"}', b"{}", b"[" * (1 << 17)):
+                one.sendall(b"\x81\xff" + len(text).to_bytes(8, "big") + bytes(4) + text)
+            rest_of(one)
+    assert len(caplog.text) < 1 << 16
