@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import socket
 import threading
 from collections.abc import Callable, Iterable
@@ -28,9 +29,12 @@ from bokeh.document import Document
 from bokeh.server.server import BaseServer
 from tornado.ioloop import IOLoop
 
-from ...errors import ParameterError
+from ...errors import ParameterError, printable
 from .access import TokenAccess, is_local
 from .connections import BoundedServer, BoundedTornado
+
+_HOST = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^\s/:\[\]]+)(:[0-9]+)?")
+"""A name or an address, with or without a port."""
 
 
 class PageServer:
@@ -52,7 +56,8 @@ class PageServer:
     Raises
     ------
     ParameterError
-        If other machines reach the address and there is no token, or address or port are not available.
+        If other machines reach the address and there is no token, address or port are not available, or an origin is
+        not a name.
     """
 
     def __init__(
@@ -71,7 +76,7 @@ class PageServer:
             raise ParameterError(f"port: got {port}, expected 0 to 65535")
         self._application = Application(FunctionHandler(fill))
         self._address, self._port, self._access = address, port, TokenAccess(token) if token else None
-        self._origins = tuple(origins)
+        self._origins = tuple(_host(origin) for origin in origins)
         self._loop = asyncio.new_event_loop()
         self._ready = threading.Event()
         self._failure: BaseException | None = None
@@ -147,9 +152,16 @@ class PageServer:
 
     def _allowed(self, port: int) -> list[str]:
         """Hosts and ports from which a page may connect to the server; pages of other sites may not."""
-        hosts = [*dict.fromkeys((self._address, "127.0.0.1", "localhost"))]
+        hosts = [*dict.fromkeys((self._address.lower(), "127.0.0.1", "localhost"))]
         own = [f"[{host}]" if ":" in host else host for host in hosts if host not in ("0.0.0.0", "::")]
         return [host if _names_port(host) else f"{host}:{port}" for host in (*own, *self._origins)]
+
+
+def _host(text: str) -> str:
+    """A name as browsers send it, in small letters."""
+    if not _HOST.fullmatch(text):
+        raise ParameterError(f"hosts: got '{printable(text)}', expected names such as lab-pc, lab-pc:5006 or [fe80::1]")
+    return text.lower()
 
 
 def _names_port(host: str) -> bool:

@@ -119,6 +119,22 @@ def test_pages_of_other_sites_get_no_websocket():
         server.close()
 
 
+@pytest.mark.parametrize("host", ["Lab-PC", "lab-pc.example.org", "[FE80::1]"])
+def test_further_names_are_welcome_however_they_are_written(host):
+    server = PageServer(fill, port=0, origins=[host])
+    try:
+        assert is_welcome(server.port, f"http://{host.lower()}:{server.port}")
+        assert not is_welcome(server.port, f"http://{host.lower()}:1")
+    finally:
+        server.close()
+
+
+@pytest.mark.parametrize("host", ["http://lab-pc", "lab-pc:5006/", "fe80::1", "a:b", "lab pc"])
+def test_a_further_name_that_no_browser_sends_is_refused(host):
+    with pytest.raises(ParameterError, match=r"^hosts: got '.*', expected names such as lab-pc"):
+        PageServer(fill, port=0, origins=[host])
+
+
 def test_a_port_that_is_taken_is_an_error_in_one_line():
     server = PageServer(fill, port=0)
     try:
