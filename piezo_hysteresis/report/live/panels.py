@@ -50,8 +50,11 @@ def state(axis: AxisState, noise: float | None) -> str:
     noise : float or None
         RMS noise of the sensor [m].
     """
-    newest = axis.window.newest(_NEWEST)
-    numbers: list[tuple[str, str, str]] = [("phase", "phase", escape(printable(axis.phase)) or "—")]
+    newest = axis.window.newest(_NEWEST if axis.is_streaming else 0.0)
+    phase = escape(printable(axis.phase)) if axis.is_streaming else ""
+    prediction = axis.part("prediction")
+    rms = None if prediction is None or prediction.age > SILENT else axis.residual_rms
+    numbers: list[tuple[str, str, str]] = [("phase", "phase", phase or "—")]
     if newest.size:
         predicted = np.flatnonzero(np.isfinite(newest.prediction))
         k = int(predicted[-1]) if predicted.size else newest.size - 1  # all numbers are those of one sample
@@ -62,7 +65,7 @@ def state(axis: AxisState, noise: float | None) -> str:
             ("residual", "residual", length(newest.residual[k])),
         ]
     numbers += [
-        ("residual_rms", "residual, RMS", length(axis.residual_rms)),
+        ("residual_rms", "residual, RMS", length(rms)),
         ("noise", "sensor noise, RMS", length(noise)),
     ]
     cells = "".join(f"<div><dt>{label}</dt><dd id='{key}'>{text}</dd></div>" for key, label, text in numbers)
@@ -71,9 +74,10 @@ def state(axis: AxisState, noise: float | None) -> str:
 
 def _driver(axis: AxisState) -> str:
     driver = axis.part("stage")
-    if driver is None or driver.age > SILENT:
-        gone = "no driver has reported yet" if driver is None else f"the driver has been silent for {driver.age:.0f} s"
-        return f"<p id='driver'>{badge(STALE, 'no driver')} {gone}</p>"
+    if driver is None:
+        return f"<p id='driver'>{badge(STALE, 'no driver')} no driver has reported yet</p>"
+    if driver.age > SILENT:
+        return f"<p id='driver'>{_gone('driver', driver)}</p>"
     claimed = driver.values.get("claimed_by", "")
     words = [escape(driver.message)]
     if claimed:
@@ -83,6 +87,10 @@ def _driver(axis: AxisState) -> str:
     if not axis.is_streaming:
         words.append("no samples arrive")
     return f"<p id='driver'>{badge(driver.level, 'driver')} {'; '.join(words)}</p>"
+
+
+def _gone(node: str, newest: Status) -> str:
+    return f"{badge(STALE, f'no {node}')} the {node} has been silent for {newest.age:.0f} s"
 
 
 def alarms(axis: AxisState) -> str:
@@ -103,6 +111,8 @@ def _alarm_row(alarm: Alarm) -> str:
 def _change(change: Status | None) -> str:
     if change is None:
         return "<h4>Change watch</h4><p>no report yet</p>"
+    if change.age > SILENT:
+        return f"<h4>Change watch</h4><p id='change'>{_gone('model node', change)}</p>"
     words = [f"{badge(change.level, 'change')} {escape(change.message)}"]
     values = change.values
     if "statistic" in values and change.level != STALE:
@@ -119,9 +129,11 @@ def _change(change: Status | None) -> str:
 
 def identification(axis: AxisState) -> str:
     """The job under way and the verdict of the last diagnosis."""
-    status = axis.identification
+    status, reported = axis.identification, axis.part("identification")
     lines = []
-    if status is None:
+    if reported is not None and reported.age > SILENT:
+        lines.append(f"<p id='job'>{_gone('identification node', reported)}</p>")
+    elif status is None:
         lines.append("<p>no identification node has reported yet</p>")
     else:
         values = status.values
@@ -184,6 +196,8 @@ def _in_use(axis: AxisState) -> str:
     prediction = axis.part("prediction")
     if prediction is None:
         return "<p>no model node has reported yet</p>"
+    if prediction.age > SILENT:
+        return f"<p id='model'>{_gone('model node', prediction)}</p>"
     used = prediction.values.get("model", "")
     if not used:
         return f"<p>{badge(prediction.level, 'prediction')} {escape(prediction.message)}</p>"

@@ -14,6 +14,9 @@
 
 """Texts of the page: a change is written with its size where there is one, and without where there is none."""
 
+import time
+
+import numpy as np
 import pytest
 
 from piezo_hysteresis.report.live import panels
@@ -53,3 +56,21 @@ def test_the_verdict_stays_until_the_next_diagnosis_whatever_its_words_are():
         values = {"state": "done", "conclusion": conclusion}
         axis.report_identification(Status("stage_x/identification_node", OK, message, values))
     assert axis.verdict == "a new sentence"
+
+
+def test_nothing_is_shown_as_present_that_a_silent_node_has_said():
+    """The page went on to show 24 nm and a green badge 'predicting' after the model node was killed."""
+    axis, index = AxisState("/stage_x"), np.arange(100, dtype=np.uint32)
+    ago = time.monotonic() - 10.0
+    axis.window.add(index, 1e-4 * index, np.full(100, 5.0), np.full(100, 2e-5))
+    axis.phase, axis.residual_rms, axis.heard = "1 scan", 2.4e-8, ago
+    for part in ("stage", "prediction", "identification"):
+        axis.report(Status(f"stage_x/a_node: {part}", OK, "at work", {"model": "sha256:0123456789abcdef"}, ago))
+    axis.identification = Status("stage_x/identification_node: identification", OK, "step 3", {"state": "running"}, ago)
+    axis.change = Status("stage_x/model_node: change", OK, "no change", {}, ago)
+    text = "".join(part(axis) for part in (panels.alarms, panels.identification, panels.model))
+    text += panels.state(axis, None)
+    for old in ("scan", "24 nm", "5.000 V", "at work", "step 3", "no change", "badge ok"):
+        assert old not in text
+    for node in ("driver", "model node", "identification node"):
+        assert f"the {node} has been silent for 10 s" in text
