@@ -108,6 +108,7 @@ class Controls:
         self._source, self._axis = source, axis
         self._pending: list[tuple[Future[Answer], Callable[[Answer], None]]] = []
         self._asked: tuple[Control, str, str] | None = None
+        self._number = 0  # of the question; an answer to an earlier one has no effect
         self._answer = Div(text="", name="answer", stylesheets=[styles], sizing_mode="stretch_width", visible=False)
         self._question = Div(text="", name="question", stylesheets=[styles], sizing_mode="stretch_width")
         self._confirm = Button(label="Confirm", name="confirm", button_type="warning", width=150)
@@ -150,14 +151,20 @@ class Controls:
         self._pending.append((self._source.call(axis, service), then))
 
     def _pressed(self, control: Control) -> None:
+        self._close()
         axis = self._axis()
         if not control.question:
             self._act(control, axis)
         elif control.plan:
             self._show(f"<p>{escape(control.name)}: asking for the plan …</p>", ready=False)
-            self._call(axis, control.plan, lambda answer: self._planned(control, axis, answer))
+            self._plan(control, axis, lambda answer: self._planned(control, axis, answer))
         else:
             self._ask(control, axis, "")
+
+    def _plan(self, control: Control, axis: str, then: Callable[[Answer], None]) -> None:
+        """Ask for a plan, whose answer counts only if the question is still the same."""
+        number = self._number
+        self._call(axis, control.plan, lambda answer: then(answer) if number == self._number else None)
 
     def _planned(self, control: Control, axis: str, answer: Answer, note: str = "") -> None:
         if answer.success:
@@ -192,7 +199,7 @@ class Controls:
             else:
                 self._planned(control, axis, answer, "<p><b>The plan has changed meanwhile.</b></p>")
 
-        self._call(axis, control.plan, compare)
+        self._plan(control, axis, compare)
 
     def _act(self, control: Control, axis: str) -> None:
         self._answer.update(text=f"<p>{escape(control.name)} {escape(axis)}: sent …</p>", visible=True)
@@ -213,4 +220,5 @@ class Controls:
 
     def _close(self) -> None:
         self._asked = None
+        self._number += 1
         self._panel.visible = False
