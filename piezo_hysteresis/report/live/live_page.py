@@ -40,7 +40,7 @@ TITLE = "Piezo stage, live"
 """Heading of the page."""
 
 SLOW = 1.0
-"""Time between two spectra and two estimates of the noise [s]."""
+"""Time between two spectra and two estimates of the noise, which need at least as much time [s]."""
 
 WINDOWS = {"1 s": 1.0, "3 s": 3.0, "10 s": 10.0}
 """Lengths of the time axis to choose from [s]."""
@@ -140,7 +140,7 @@ class LivePage:
                 self._window = axis.window.newest(max(WINDOWS.values()))
             window = self._window
         else:
-            self._window, window = None, axis.window.newest(-self._figures.shown[0])
+            self._window, window = None, axis.window.newest(max(SLOW, -self._figures.shown[0]))
         self._draw(axis, window)
         self._write(axis)
 
