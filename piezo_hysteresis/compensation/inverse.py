@@ -27,7 +27,7 @@ from ..blocks.inverses.held_deviation import HeldDeviation
 from ..blocks.inverses.inverted_block import InvertedBlock
 from ..blocks.inverses.linear_inverse import InvertedLinear
 from ..c_form import CForm
-from ..effects import ChainPosition, Effect, Invertibility
+from ..effects import ChainPosition, Invertibility
 from ..errors import ModelError
 from ..inverse_terms import InverseTerms
 from ..model.chain import ChainState
@@ -82,11 +82,14 @@ class Inverse:
     preview : int
         Number of samples of the wanted displacement that must be known in advance.
     is_exact : bool
-        False if an effect was left out or has an approximate inverse.
+        False if an effect was left out or has an approximate inverse, or if the hysteresis output would fall while the
+        drive rises, at a speed that the limits allow.
     left_out : tuple of str
         Effects that have no inverse and were left out.
     not_on_path : tuple of str
         Effects that the drive voltage does not influence.
+    ends : (float, float)
+        Lowest and highest normalised drive; where no voltage gives what is wanted, the drive is at one of them.
     noise_gain : float
         Largest factor by which rounding errors of the wanted displacement grow in the drive.
 
@@ -121,15 +124,14 @@ class Inverse:
             )
         self.model, self.limits, self.left_out = model, limits or Limits(), tuple(impossible)
         self.sample_period, self.chain = model.sample_period, model.at(model.sample_period)
-        kept = Model(
-            tuple(e for e in model.effects if e.invertibility is not Invertibility.IMPOSSIBLE and not _is_idle(e)),
-            model.sample_period,
-            model.voltage_scale,
-            model.displacement_scale,
-        ).at(model.sample_period)
+        possible = [e for e in model.effects if e.invertibility is not Invertibility.IMPOSSIBLE]
+        # another form of an effect of the drive can take the place of one that is switched off
+        used = tuple(e for e in possible if e.place is not ChainPosition.DRIVE or not e.is_off)
+        kept = Model(used, model.sample_period, model.voltage_scale, model.displacement_scale).at(model.sample_period)
         self.not_on_path = tuple(e.name for e in model.effects if e.invertibility is Invertibility.NOT_NEEDED)
         terms = _terms_of_nonlinear_part(kept.blocks, kept.labels)
         self._nonlinear = NonlinearPart(terms, self.limits, self.sample_period)
+        self.ends = self._nonlinear.ends
         numbers = [self.chain.labels.index(label) for label in kept.labels]  # the states are those of the whole model
         numbered = list(zip(numbers, kept.blocks, strict=True))
         self._before, after = numbered[: len(terms)], numbered[len(terms) :]
@@ -143,8 +145,9 @@ class Inverse:
         previews = [stage.preview for _, stage in inverted]
         self._ahead = [sum(previews[k + 1 :]) for k in range(len(previews))]
         self.preview = sum(previews)
-        on_drive = [e for e in model.effects if e.place is ChainPosition.DRIVE and not e.is_off]
-        exact = all(e.invertibility is Invertibility.EXACT for e in on_drive)
+        recursive = [e for e in model.effects if e.place in (ChainPosition.DRIVE, ChainPosition.HYSTERESIS)]
+        exact = all(e.is_off or e.invertibility is Invertibility.EXACT for e in recursive)
+        exact = exact and self._nonlinear.rises_at_every_speed
         self.is_exact = exact and not impossible and all(stage.is_exact for _, stage in inverted)
         self.noise_gain = float(np.prod([stage.noise_gain for _, stage in inverted]))
 
@@ -227,11 +230,6 @@ class Inverse:
             for (k, stage), ahead in zip(self._stages, self._ahead, strict=True)
         }
         return found | {"drive": (0, self._nonlinear.c_form())}
-
-
-def _is_idle(effect: Effect) -> bool:
-    """Whether an effect of the drive is switched off, so that another form of it can take its place in the inverse."""
-    return effect.place is ChainPosition.DRIVE and effect.is_off
 
 
 def _terms_of_nonlinear_part(blocks: Sequence[Block], labels: Sequence[str]) -> list[InverseTerms]:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -88,14 +89,24 @@ def reachable(
     free = Inverse(ideal, Limits(resolution=limits.resolution), band=band, approximate=approximate)
     given, reached = _followed(limited, y, state)
     needed, aim = _followed(free, y, state)
+    no_voltage = _is_at_an_end(needed, free, state)[free.preview :]
+    off = reached - np.where(no_voltage, y, aim)
     span = float(np.ptp(y)) or float(np.abs(y).max()) or model.displacement_scale
     span = min(span, model.displacement_scale)  # what is too large is not allowed a larger error
-    off = reached - aim
-    parts = _parts(off, needed, span, limits, model, limited.preview, aim, ideal is not model)
+    bad = np.flatnonzero(np.abs(off) > TOLERANCE * span)
+    lowest, direction = _at_the_lowest_voltage(model, limits)
+    parts = []
+    for a, b in _runs(bad, max(1, round(2e-3 / model.sample_period))):
+        worst = a + int(np.abs(off[a : b + 1]).argmax())
+        kept = direction * (float(aim[worst]) - lowest) >= -TOLERANCE * span
+        part = _part(model, limits, needed[a : b + free.preview + 1], a, b + 1, float(off[worst]))
+        if no_voltage[worst]:
+            part = replace(part, limit="model")
+        parts.append(replace(part, after_loop=kept and part.limit == "voltage_min"))
     nearest = None
     if parts and search:
         nearest = nearest_path(model, limits, y, state, band=band, approximate=approximate)
-    return Reachability(parts, nearest, reached, given)
+    return Reachability(tuple(parts), nearest, reached, given)
 
 
 def without_amplifier_limits(model: Model) -> Model:
@@ -116,52 +127,39 @@ def _followed(inverse: Inverse, y: Array, state: ChainState) -> tuple[Array, Arr
     return u, reached[inverse.preview :]
 
 
-def _parts(
-    off: Array,
-    needed: Array,
-    span: float,
-    limits: Limits,
-    model: Model,
-    preview: int,
-    aim: Array,
-    is_limited: bool,
-) -> tuple[UnreachablePart, ...]:
+def _is_at_an_end(u: Array, inverse: Inverse, state: ChainState) -> NDArray[np.bool_]:
+    """Where a drive (n,) [V] of the inverse is at an end of the voltages that it searches, shape (n,)."""
+    v, chain = u, inverse.chain
+    for k in range(chain.labels.index("voltage_scale") + 1):
+        v, _ = chain.blocks[k].run(v, state.blocks[k])
+    low, high = inverse.ends
+    slack = 1e-9 * (high - low)
+    return np.asarray((v <= low + slack) | (v >= high - slack))
+
+
+def _runs(indices: NDArray[np.intp], gap: int) -> list[tuple[int, int]]:
+    """First and last of every run of indices; a run ends where more than `gap` are missing."""
+    if not indices.size:
+        return []
+    ends = np.flatnonzero(np.diff(indices) > gap)
+    firsts, lasts = np.append(indices[0], indices[ends + 1]), np.append(indices[ends], indices[-1])
+    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
+
+
+def _part(model: Model, limits: Limits, needed: Array, begin: int, end: int, largest: float) -> UnreachablePart:
+    """The part from sample `begin` to `end`, that would need the drive `needed` [V]."""
     period = model.sample_period
-    bad = np.flatnonzero(np.abs(off) > TOLERANCE * span)
-    if not bad.size:
-        return ()
-    gap = max(1, round(2e-3 / period))
-    ends = np.flatnonzero(np.diff(bad) > gap)
-    begins = np.concatenate((bad[:1], bad[ends + 1]))
-    stops = np.concatenate((bad[ends], bad[-1:]))
-    lowest, direction = _at_the_lowest_voltage(model, limits)
-    found = []
-    for a, b in zip(begins, stops, strict=True):
-        here = needed[a : b + preview + 1]
-        low, high = float(here.min()), float(here.max())
-        slew = float(np.abs(np.diff(here)).max(initial=0.0)) / period
-        beyond = {
-            "voltage_min": limits.voltage_min - low,
-            "voltage_max": high - limits.voltage_max,
-            "max_slew_rate": (slew - limits.max_slew_rate) * period,
-        }
-        limit = max(beyond, key=lambda name: beyond[name])
-        if is_limited and beyond[limit] <= 0.0:
-            limit = "amplifier"
-        worst = a + int(np.abs(off[a : b + 1]).argmax())
-        found.append(
-            UnreachablePart(
-                period * float(a),
-                period * float(b + 1),
-                float(off[worst]),
-                low,
-                high,
-                slew,
-                limit,
-                limit == "voltage_min" and direction * (float(aim[worst]) - lowest) >= -TOLERANCE * span,
-            )
-        )
-    return tuple(found)
+    low, high = float(needed.min()), float(needed.max())
+    slew = float(np.abs(np.diff(needed)).max(initial=0.0)) / period
+    beyond = {
+        "voltage_min": limits.voltage_min - low,
+        "voltage_max": high - limits.voltage_max,
+        "max_slew_rate": (slew - limits.max_slew_rate) * period,
+    }
+    limit = max(beyond, key=lambda name: beyond[name])
+    if beyond[limit] <= 0.0 and without_amplifier_limits(model) is not model:
+        limit = "amplifier"
+    return UnreachablePart(period * begin, period * end, largest, low, high, slew, limit)
 
 
 def _at_the_lowest_voltage(model: Model, limits: Limits) -> tuple[float, float]:

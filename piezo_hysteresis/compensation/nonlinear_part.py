@@ -26,11 +26,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..blocks.block import Block, State
+from ..blocks.bouc_wen import bouc_wen_kernel as k
 from ..c_form import CForm, Number
 from ..effects.drive.amplifier_saturation import RAMP
 from ..effects.hysteresis.level_density import DENSITY_IN_C, VALUE_IN_C
 from ..errors import ModelError
-from ..inverse_terms import NO_LOOP, POLYNOMIAL, InverseTerms, LoopTerms, PlayTerms, RelaxationTerms
+from ..inverse_terms import GENERAL, NO_LOOP, POLYNOMIAL, InverseTerms, LoopTerms, PlayTerms, RelaxationTerms
 from . import hysteresis_solver as solver
 from . import hysteresis_solver_c as solver_c
 from . import recursion as r
@@ -85,6 +86,29 @@ class NonlinearPart:
         self.drive = tuple(drive.tolist())
         self._relaxations = [t.relaxations for t in terms if t.relaxations is not None]
         self.bank = self._bank(self._relaxations)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest normalised drive of the search for roots."""
+        return self.drive[r.LOW], self.drive[r.HIGH]
+
+    @property
+    def rises_at_every_speed(self) -> bool:
+        """Whether w rises with the drive, or falls with it, at every speed inside the limits, also after it turns.
+
+        Only a rate law is examined: a steep one has no root, or several, for steps of the drive above some speed.
+        """
+        p = self.loop
+        if self.kind != GENERAL or p[k.RATE] == 0.0:
+            return True
+        fastest = min(self.drive[r.STEP] * self.drive[r.PER_VOLT], self.ends[1] - self.ends[0]) / self.periods[0]
+        for speed in (k.SLOWEST, max(k.SLOWEST, fastest)):
+            law = k.rate_factor(speed, p[k.RATE_EXPONENT])
+            before = 1.0 + p[k.RATE] * law  # h turns with twice the slope
+            now = before + p[k.RATE] * speed ** p[k.RATE_EXPONENT]
+            if (self.poly[solver.P2] + p[k.A] * (before + now)) * self.drive[r.TURN] <= 0.0:
+                return False
+        return True
 
     def _bracket(self, d: Array) -> None:
         """Set in `d` the interval of the search for roots: between extrema of the static curve, inside the limits."""

@@ -42,7 +42,8 @@ class UnreachablePart:
         Largest rate of change of the voltage that it would need [V/s].
     limit : str
         The limit that is exceeded most: ``voltage_min``, ``voltage_max`` or ``max_slew_rate``; ``amplifier`` if the
-        drive is inside its limits, but not inside those of the amplifier of the model.
+        drive is inside its limits, but not inside those of the amplifier of the model; ``model`` if no voltage gives
+        the displacement.
     after_loop : bool
         True if the displacement can be reached from rest, but not after the preceding motion, because of the
         hysteresis.
@@ -60,16 +61,16 @@ class UnreachablePart:
     def __str__(self) -> str:
         slew = slew_text(self.needed_slew, 4)
         needed = {
-            "voltage_min": f"{self.needed_min:.3g} V",
-            "voltage_max": f"{self.needed_max:.3g} V",
-            "max_slew_rate": slew,
-            "amplifier": f"{self.needed_min:.3g} to {self.needed_max:.3g} V with up to {slew}",
+            "voltage_min": f"{self.needed_min:.3g} V, below voltage_min",
+            "voltage_max": f"{self.needed_max:.3g} V, above voltage_max",
+            "max_slew_rate": f"{slew}, above max_slew_rate",
+            "amplifier": f"{self.needed_min:.3g} to {self.needed_max:.3g} V with up to {slew}, more than the amplifier "
+            "of the model gives",
+            "model": "a displacement that no voltage gives in the model",
         }[self.limit]
-        beyond = {"voltage_min": "below voltage_min", "amplifier": "more than the amplifier of the model gives"}
         message = (
-            f"the path cannot be reached from {self.begin:.4g} to {self.end:.4g} s: it needs {needed}, "
-            f"{beyond.get(self.limit, f'above {self.limit}')}; the error would be up to "
-            f"{1e9 * abs(self.largest):.0f} nm"
+            f"the path cannot be reached from {self.begin:.4g} to {self.end:.4g} s: it needs {needed}; the error would "
+            f"be up to {1e9 * abs(self.largest):.0f} nm"
         )
         if self.after_loop:
             message += (

@@ -122,6 +122,24 @@ def test_what_the_amplifier_of_the_model_cannot_give_is_not_reachable(limit: Eff
     assert plan(stage(), y, UNIPOLAR).reachability.is_whole
 
 
+@pytest.mark.parametrize("limits", [Limits(), Limits(-50.0, 100.0), Limits(0.0, 40.0)])
+def test_what_no_voltage_gives_is_not_reachable(limits: Limits) -> None:
+    """The cubic bends the curve until it falls. The drive stayed at its highest point, with and without the limits."""
+    model = stage()
+    highest = 10.0 * np.sqrt(model["bouc_wen"]["p2"] / -3.0 / model["bouc_wen"]["p1"])
+    top = float(model.run([highest], model.rest(highest))[0][0])
+    assert plan(model, swing(50.0, 0.3 * top, 0.6 * top, 2), limits).reachability.is_whole
+    found = plan(model, swing(50.0, 0.3 * top, 1.5 * top, 2), limits)
+    assert {part.limit for part in found.reachability.parts} == {"model"}
+    assert "a displacement that no voltage gives in the model" in str(found.reachability.parts[0])
+    largest = max(abs(part.largest) for part in found.reachability.parts)
+    assert largest == pytest.approx(np.abs(found.path_predicted - found.wanted).max(), rel=1e-6)
+    nearest = found.reachability.nearest
+    assert nearest is not None and nearest.amplitude is not None
+    middle = 0.5 * (found.wanted.min() + found.wanted.max())
+    assert plan(model, middle + nearest.amplitude * (found.wanted - middle), limits).reachability.is_whole
+
+
 @pytest.mark.parametrize("metres", [0.5, 1.0, -1.0, 1e3])
 def test_a_path_in_micrometres_is_out_of_reach(metres: float) -> None:
     assert not reachable(stage(), UNIPOLAR, np.full(16, metres), search=False).is_whole

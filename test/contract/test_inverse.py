@@ -42,6 +42,7 @@ from piezo_hysteresis.effects import (
     Offset,
     PublishedBoucWen,
     RateDependentHysteresis,
+    RateDependentHysteresisLagged,
     SensorBandwidth,
 )
 from piezo_hysteresis.errors import DivergenceError, ModelError, ParameterError
@@ -321,6 +322,21 @@ def test_a_falling_curve_is_turned_round_too() -> None:
 def test_a_loop_with_rate_is_exact_where_it_is_steep_enough() -> None:
     model = model_with(RateDependentHysteresis(k=-0.02, a=0.1))
     assert mismatch(model, Inverse(model)) < 1e-12
+
+
+def test_a_loop_with_rate_is_not_exact_at_speeds_at_which_w_would_fall() -> None:
+    """At 150/s no step of the drive reaches what is wanted, and the path was missed by 11 times its range."""
+    model = model_with(RateDependentHysteresis(k=0.09, a=0.5))
+    assert mismatch(model, Inverse(model)) > 1.0
+    assert not Inverse(model).is_exact
+    assert not Inverse(model, Limits(max_slew_rate=1500.0)).is_exact
+    assert Inverse(model, Limits(max_slew_rate=50.0)).is_exact
+
+
+def test_a_loop_that_follows_the_speed_with_a_lag_is_not_exact() -> None:
+    model = model_with(RateDependentHysteresisLagged(k=0.01, a=0.1, tau=2e-4))
+    assert mismatch(model, Inverse(model)) > 1e-4
+    assert not Inverse(model).is_exact
 
 
 def test_the_lag_behind_a_largest_slope_is_left_out_and_told() -> None:
