@@ -14,6 +14,8 @@
 
 """The slow integral behind a displacement that is held: what it settles to, and that it does not wind up."""
 
+import math
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -110,7 +112,7 @@ def test_a_hold_ends_with_the_driver(reason) -> None:
     driver = Driver(1e-6, 0.0)
     point = SetPoint(driver, 0.5)
     point.go(5e-6, 5.3, 1e6, Limits(0.0, 10.0))
-    client = SimpleNamespace(missing="", blocked="", refused_voltage="", distance=lambda voltage: 0.0)
+    client = SimpleNamespace(missing="", blocked="", refused_since=lambda since: "", distance=lambda voltage: 0.0)
     lost: list[str] = []
     point.hold(TICK, client, lost.append)
     assert not lost
@@ -124,17 +126,23 @@ def test_a_hold_ends_with_the_driver(reason) -> None:
     assert driver.voltages == [0.0, 5.3]
 
 
-def test_a_refused_voltage_ends_a_hold_on_its_way_only() -> None:
-    """Behind the arrival, it was a voltage of another client."""
-    for distance, ended in ((53.0, 1), (0.5, 0)):
-        point = SetPoint(Driver(1e-6, 0.0), 0.5)
-        point.go(5e-6, 5.3, 1e6, Limits(0.0, 10.0))
-        client = SimpleNamespace(missing="", blocked="", refused_voltage="", distance=lambda voltage, d=distance: d)
-        lost: list[str] = []
-        point.hold(TICK, client, lost.append)
-        client.refused_voltage = "it is playing"
-        point.hold(TICK, client, lost.append)
-        assert len(lost) == ended
+@pytest.mark.parametrize(("distance", "age", "ended"), [(53.0, 0.0, 1), (0.5, 0.0, 0), (53.0, 1.0, 0)])
+def test_a_refused_voltage_ends_a_hold_on_its_way_only(distance, age, ended) -> None:
+    """Behind the arrival, and before this hold, it was a voltage of another client."""
+    refused = [-math.inf]
+    client = SimpleNamespace(
+        missing="",
+        blocked="",
+        refused_since=lambda since: "it is playing" if refused[-1] > since else "",
+        distance=lambda voltage: distance,
+    )
+    point = SetPoint(Driver(1e-6, 0.0), 0.5)
+    point.go(5e-6, 5.3, 1e6, Limits(0.0, 10.0))
+    lost: list[str] = []
+    point.hold(TICK, client, lost.append)
+    refused.append(time.monotonic() - age)
+    point.hold(TICK, client, lost.append)
+    assert len(lost) == ended
 
 
 def test_without_an_integral_time_nothing_is_corrected() -> None:

@@ -154,7 +154,6 @@ class CompensationNode(GuardedNode):
             self._status.refuse("set_displacement", str(error))
             return
         voltage, slope = float(found.voltage[-1]), volts_per_metre(applied.model, limits)
-        self._driver.refused_voltage = ""
         self._set_point.go(float(message.data), voltage, slope, limits)
         self._status.show("set", f"{1e6 * message.data:.6g} µm by {voltage:.6g} V", "set_displacement")
 

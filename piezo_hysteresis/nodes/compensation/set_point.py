@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -59,7 +61,7 @@ class SetPoint:
         self._publisher, self._integral_time = publisher, integral_time
         self._target: float | None = None
         self._voltage = self._slope = 0.0
-        self._limits = Limits()
+        self._limits, self._sent_at = Limits(), math.inf
         self._await_arrival()
 
     def _await_arrival(self) -> None:
@@ -88,10 +90,9 @@ class SetPoint:
         why = driver.missing and f"no driver: waiting for {driver.missing}"
         why = why or driver.blocked
         distance = driver.distance(self._voltage)
-        if self._has_arrived or distance <= 1.0:
-            driver.refused_voltage = ""  # that of another client
-        elif driver.refused_voltage:
-            why = why or f"the driver refused: {driver.refused_voltage}"
+        on_the_way = not self._has_arrived and distance > 1.0  # behind the arrival, a voltage of another client
+        if on_the_way and not why and (refused := driver.refused_since(self._sent_at)):
+            why = f"the driver refused: {refused}"
         if not why and self.has_left(distance, elapsed):
             why = driver.misplaced(self._voltage)
         if why:
@@ -129,4 +130,5 @@ class SetPoint:
 
     def _send(self) -> None:
         self._await_arrival()
+        self._sent_at = time.monotonic()
         send(self._publisher, Float64(data=self._voltage))

@@ -78,8 +78,6 @@ class DriverClient:
         State of the last phase: ``sending``, ``sent``, ``accepted``, ``playing``, ``done``, ``refused`` or ``stopped``.
     first_index : int
         Index of its first sample, once it plays.
-    refused_voltage : str
-        Reason of the last refusal of a 'set_voltage', of this client or of another one; its user empties it.
     stopped : str
         Reason why the driver accepts no command; empty where it was not stopped.
     voltages : int
@@ -93,7 +91,8 @@ class DriverClient:
     def __init__(self, node: GuardedNode, driver: str) -> None:
         self._node, self._driver = node, driver
         self.limits: DriveLimits | None = None
-        self.state = self.reason = self.stopped = self.refused_voltage = ""
+        self.state = self.reason = self.stopped = ""
+        self._refused_voltage, self._refused_at = "", -math.inf
         self.first_index = self.voltages = 0
         self.owner, self.holder = f"{node.get_name()}.{os.getpid()}", ""
         self._claims = advertise(node, "claim")
@@ -237,10 +236,20 @@ class DriverClient:
         self._newest = float(message.data)
         self.voltages += 1
 
+    def refused_since(self, since: float) -> str:
+        """Why a 'set_voltage' of this client or of another one was refused after `since`; empty if none was.
+
+        Parameters
+        ----------
+        since : float
+            Time on the clock of `time.monotonic` [s].
+        """
+        return self._refused_voltage if self._refused_at > since else ""
+
     def _on_status(self, status: DiagnosticStatus) -> None:
         values = values_of(status)
         if status.name == "set_voltage" and values.get("state") == "refused":
-            self.refused_voltage = status.message
+            self._refused_voltage, self._refused_at = status.message, time.monotonic()
         if self._sent == (status.name, values.get("stamp")):
             self.state, self.reason = values.get("state", ""), status.message
             first = values.get("first_index", "")
