@@ -21,6 +21,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..effects import Arx, ChainPosition
 from ..identification.fit.fit import Fit
 from ..record import Notice
 
@@ -94,18 +95,22 @@ def fitted_parameters(fit: Fit | None) -> tuple[Mapping[str, Any], ...]:
 
 
 def _parameters(fit: Fit) -> Iterable[Mapping[str, Any]]:
+    model = fit.model
     for name, value in fit.values.items():
-        row = fit.model.row(name)
+        row = model.row(name)
         lower, upper = fit.interval(name)
         volts, metres = row.powers
-        factor, unit = fit.model.voltage_scale**volts * fit.model.displacement_scale**metres, row.physical_unit
+        before_dynamics = model[name.partition(".")[0]].place is ChainPosition.HYSTERESIS
+        output = model.displacement_scale * (model.effect(Arx).dc_gain if before_dynamics else 1.0)
+        factor, unit = model.voltage_scale**volts * output**metres, row.physical_unit
         if unit == "samples":
-            factor, unit = fit.model.sample_period, "s"
+            factor, unit = model.sample_period, "s"
+        low, high = sorted((factor * max(lower, row.lower), factor * min(upper, row.upper)))
         yield {
             "name": name,
             "value": _finite(factor * value),
-            "lower": _finite(factor * max(lower, row.lower)),
-            "upper": _finite(factor * min(upper, row.upper)),
+            "lower": _finite(low),
+            "upper": _finite(high),
             "unit": unit,
             "at_bound": name in fit.at_bounds,
         }

@@ -33,6 +33,7 @@ from ..model.sample_periods import identified_periods
 from ..record import Notice, Record
 from .fit.fit import Fit, Progress
 from .fit.form_uncertainty import ADEQUACY, with_form_uncertainty
+from .fit.gauge import Gauge
 from .fit.joint import fit_dynamics, fit_joint, fit_lag, without_intersample_error
 from .fit.normal_equations import Nuisance, residuals
 from .identification import INSEPARABLE, Identification, correlated_pairs, phase_errors, undetermined
@@ -69,7 +70,7 @@ def identify(
     *,
     voltage_scale: float | None = None,
     displacement_scale: float | None = None,
-    gain: float = 1.0,
+    gain: float | None = None,
     orders: tuple[int, int] | None = (8, 8),
     hysteresis: type[HysteresisOperator] = HYSTERESIS,
     memory: bool = False,
@@ -86,8 +87,8 @@ def identify(
         v = u / voltage_scale [V]; default the largest absolute voltage.
     displacement_scale : float, optional
         Displacement at normalised output 1 [m]; default the range of the displacement.
-    gain : float
-        G(1): the settled output is w times this gain.
+    gain : float, optional
+        G(1): the settled output is w times this gain. Default 1, or -1 if the stage moves against the drive.
     orders : (int, int) or None
         na and nb of the ARX model; None chooses the lowest order that is as good as any other.
     hysteresis : type of HysteresisOperator
@@ -138,8 +139,10 @@ def identify(
     reach = max(float(np.ptp(r.displacement)) for r in records)
     if reach == 0.0:
         raise IdentificationError("identify: the displacement never changes; expected that of a stage that is driven")
-    scale_v = max(float(np.max(np.abs(r.voltage))) for r in records) if voltage_scale is None else voltage_scale
-    scale_y = reach if displacement_scale is None else displacement_scale
+    natural = Gauge.natural(records, roles.loops)
+    chosen_gauge = {"voltage_scale": voltage_scale, "displacement_scale": displacement_scale, "gain": gain}
+    gauge = replace(natural, **{name: value for name, value in chosen_gauge.items() if value is not None})
+    scale_v, scale_y = gauge.voltage_scale, gauge.displacement_scale
     floors = [max(c.noise, ADEQUACY * reach) for c in roles.contents]
     period = experiment.fastest_period
     notices: list[Notice] = [*experiment.notices, *axes_notices, *conditioning_notices, *noise_notices]
@@ -150,7 +153,7 @@ def identify(
 
     report("step 3: hysteresis", 0.1)
     dead = 1.0 if delay is None else max(1.0, delay.time / period)
-    frame = Model((hysteresis(), Arx(a=(), b=(gain,), delay=dead)), period, scale_v, scale_y)
+    frame = Model((hysteresis(), Arx(a=(), b=(gauge.gain,), delay=dead)), period, scale_v, scale_y)
     start = behind_the_gauge(frame, published, records, roles.loops)
     dynamics: Dynamics | None = None
     table: tuple[OrderError, ...] = ()
@@ -195,9 +198,10 @@ def identify(
     elif memory and start.hysteresis.memoryless() is not None:
         quiet = [max(noise, ADEQUACY * reach) for noise in sensor_noise(records)]
         choice = choose_structure(
-            start, records, quiet, roles.fitted, lambda word, part: report(word, 0.2 + 0.7 * part)
+            natural.of_model(start), records, quiet, roles.fitted, lambda word, part: report(word, 0.2 + 0.7 * part)
         )
-        joint, structure = choice.fit, choice
+        joint = gauge.of_fit(choice.fit)
+        structure = replace(choice, fit=joint)
         notices += choice.notices
     else:
         report("joint fit", 0.3)

@@ -45,7 +45,10 @@ def experiment_of(given: Record | Iterable[Record]) -> Experiment:
 
 
 def check_gauge(
-    voltage_scale: float | None, displacement_scale: float | None, gain: float, hysteresis: type[HysteresisOperator]
+    voltage_scale: float | None,
+    displacement_scale: float | None,
+    gain: float | None,
+    hysteresis: type[HysteresisOperator],
 ) -> None:
     """Check what an identified model is expressed in.
 
@@ -57,7 +60,7 @@ def check_gauge(
     for name, scale in (("voltage_scale", voltage_scale), ("displacement_scale", displacement_scale)):
         if scale is not None and not 0.0 < scale < math.inf:
             raise ParameterError(f"{name}: got {scale!r}, expected a positive number or None")
-    if gain == 0.0 or not math.isfinite(gain):
-        raise ParameterError(f"gain: got {gain!r}, expected a number other than 0")
+    if gain is not None and (gain == 0.0 or not math.isfinite(gain)):
+        raise ParameterError(f"gain: got {gain!r}, expected a number other than 0, or None")
     if not (isinstance(hysteresis, type) and issubclass(hysteresis, HysteresisOperator)):
         raise ParameterError(f"hysteresis: got {hysteresis!r}, expected a class of operators, such as BoucWen")

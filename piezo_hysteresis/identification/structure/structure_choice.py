@@ -103,7 +103,7 @@ def choose_structure(
     Parameters
     ----------
     start : Model
-        Model with a hysteresis fitted to the loops; its scales and its gain are kept.
+        Model with a hysteresis fitted to the loops, in its natural gauge (`Gauge`), which is kept.
     records : sequence of Record
         Records in the order of the experiment.
     floors : sequence of float
@@ -213,7 +213,7 @@ def _with_plays(start: Model, records: Sequence[Record]) -> Model:
         level,
         EvenInputPolynomial(),
         creep.with_values(gamma_fast=START_CREEP, gamma_slow=START_CREEP),
-        Arx(a=(), b=(1.0,), delay=1.0),
+        Arx(a=(), b=(start.effect(Arx).dc_gain,), delay=1.0),
     )
     return Model(effects, period, start.voltage_scale, start.displacement_scale)
 
