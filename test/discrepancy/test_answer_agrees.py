@@ -120,13 +120,13 @@ def check_agreement(found):
 
 
 def test_a_held_level_is_found_in_a_record_that_is_interpolated():
-    """Between levels of 0.1, 0.7 and 0.3, the spline moves by 1e-217: the answer said that no level is held."""
+    """Between equal samples, the spline moves by 1e-217: the answer said that no level is held."""
     rng, period = np.random.default_rng(0), 5e-4
     t = period * np.arange(2000)
     loop = np.abs(np.mod(2 * t + 0.5, 1.0) * 2.0 - 1.0)
     drives = [(0.5 + 0.02 * rng.normal(size=2000), 1)] + [(a * loop, 1) for a in (1.0, 0.6, 0.3)]
-    levels = np.interp(10 * period * np.arange(800), [0.0, 0.05, 1.3, 1.35, 2.6, 2.65], [0.0, 0.1, 0.1, 0.7, 0.7, 0.3])
-    drives += [(levels, 10)]
+    at, levels = (0.0, 0.03, 1.3, 1.33, 2.6, 2.63), (0.0, 0.1, 0.1, 0.7, 0.7, 0.3)
+    drives += [(np.interp(2 * period * np.arange(4000), at, levels), 2)]
     records = [Record(u, 1e-5 * u + 2e-9 * rng.normal(size=u.size), n * period) for u, n in drives]
     found = diagnose(records)
     assert found.selection is not None

@@ -99,6 +99,14 @@ def test_slow_loops_and_jumps_stay_at_their_own_period():
     assert at_period(stairs, FAST) is stairs
 
 
+def test_levels_with_steep_ramps_between_them_stay_at_their_own_period():
+    """A spline swings at the ends of a ramp: creep of 1.43 % per decade had the interval 1.33 to 1.41 %."""
+    levels = np.convolve(np.repeat((20.0, 60.0, 90.0, 40.0), 1500), np.full(10, 0.1), "valid")
+    staircase = Record(levels, 1e-7 * levels, 2e-3)
+    assert not excitation_content(staircase).is_slow
+    assert at_period(staircase, 4e-4) is staircase
+
+
 def test_the_dynamics_set_the_period_and_faster_records_are_averaged():
     noise = Record(RANDOM.normal(size=4000), RANDOM.normal(size=4000), 5 * FAST)
     step = Record(np.repeat([0.0, 1.0], 1000), np.repeat([0.0, 1e-6], 1000), FAST)

@@ -41,8 +41,8 @@ PATH_LOST = 0.01
 """Largest share of the path of the drive, Σ |Δu|, that its block averages may lose; a loop remembers every turn."""
 FAST = 1e-3
 """Smallest curvature of a fast drive: mean second difference over standard deviation; slow loops have 1e-5."""
-SMOOTH = 2e-3
-"""Largest RMS error of a spline through every second sample of a smooth drive, relative to its range."""
+SMOOTH = 5e-3
+"""Largest error of a spline through every second sample of a smooth drive, relative to its range."""
 MOST = 200_000
 """Largest number of samples of an interpolated record."""
 ALIKE = 0.1
@@ -175,7 +175,7 @@ def at_period(record: Record, period: float) -> Record:
 def _is_smooth(u: Array) -> bool:
     at = np.arange(u.size)
     between = scipy.interpolate.make_interp_spline(at[::2], u[::2])(at[1 : at.size - 1 : 2])
-    return bool(np.sqrt(np.mean((between - u[1 : u.size - 1 : 2]) ** 2)) < SMOOTH * float(np.ptp(u)))
+    return bool(np.abs(between - u[1 : u.size - 1 : 2]).max() < SMOOTH * float(np.ptp(u)))
 
 
 def _interpolated(record: Record, period: float) -> Record:
