@@ -150,7 +150,8 @@ class TokenForm(RequestHandler):
         access = self.application.auth_provider
         if access.accepts(self.get_body_argument("token", "")):
             self.set_signed_cookie(access.cookie, "visitor", expires_days=None, httponly=True, samesite="Strict")
-            self.redirect("/")
+            wanted = self.get_query_argument("next", "/").partition("?")[2]  # the axis, and nothing of another site
+            self.redirect(f"/?{wanted}" if wanted else "/")
             return
         await asyncio.sleep(_DELAY)
         self.set_status(403)

@@ -106,6 +106,21 @@ def test_the_page_is_shown_after_the_token_and_not_before(guarded, visitor):
     assert SECRET in visitor(guarded.url)
 
 
+def test_the_axis_of_the_address_is_shown_after_the_token_and_no_other_site(visitor):
+    def asked(document: Document) -> None:
+        document.title = f"asked for {document.session_context.request.arguments}"
+        document.add_root(Div())
+
+    server = PageServer(asked, "0.0.0.0", 0, TOKEN)
+    try:
+        assert 'name="token"' in visitor(f"{server.url}?axis=/stage_y")
+        assert "/stage_y" in visitor(f"{server.url}login?next=%2F%3Faxis%3D%2Fstage_y", token=TOKEN)
+        for other in ("//example.invalid/", "http://example.invalid/?axis=/stage_y"):
+            assert "asked for" in visitor(f"{server.url}login?next={other}", token=TOKEN)
+    finally:
+        server.close()
+
+
 def test_a_websocket_needs_the_token_too(guarded):
     assert not is_welcome(guarded.port, f"http://127.0.0.1:{guarded.port}")
 
