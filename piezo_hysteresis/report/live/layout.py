@@ -41,8 +41,9 @@ page.silence = setTimeout(() => {
   page.search = setInterval(search, 10000)
 }, 3000)
 """
-"""Runs in the browser at every drawing. Without one for 3 s the page is marked, because its numbers are old and its
-buttons do nothing, and it is loaded anew as soon as the server answers."""
+"""Runs in the browser at every drawing. Without one for 3 s the page is marked, because its numbers are old, and it is
+loaded anew if the server answers 10 s later and does not draw. The buttons of the head remain: a stop that arrives
+late is better than none."""
 
 
 @dataclass(frozen=True, slots=True)

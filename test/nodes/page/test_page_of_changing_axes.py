@@ -151,3 +151,14 @@ def test_a_page_without_its_program_says_so_and_is_loaded_anew_with_the_same_axi
     browser.wait(lambda: browser.value("Bokeh.documents[0].get_model_by_name('axis').value") == OTHER, "the axis")
     browser.click("Stop")
     browser.wait(lambda: f"Stop {OTHER}" in browser.text("answer"), "the answer of the driver")
+
+
+def test_a_stop_that_is_pressed_while_the_page_node_hangs_is_carried_out_when_it_goes_on(nodes, browser):
+    choose(browser, AXIS)
+    browser.wait(lambda: "stopped" not in browser.text("driver"), "the first axis, which is not stopped")
+    page = nodes.processes[-1]
+    page.signal(signal.SIGSTOP)
+    browser.wait(lambda: browser.value("document.getElementById('lost').offsetHeight") > 0, "the notice")
+    browser.click("Stop")
+    page.signal(signal.SIGCONT)
+    browser.wait(lambda: "stopped" in browser.text("driver"), "the stop")
