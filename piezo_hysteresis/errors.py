@@ -51,6 +51,15 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape", "backslashreplace").decode() for c in text)
 
 
+def counted(number: int, noun: str) -> str:
+    """A number of things as text.
+
+    >>> counted(1, "complete phase"), counted(2, "phase")
+    ('1 complete phase', '2 phases')
+    """
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def reason_of(error: BaseException) -> str:
     """An exception in one line: the message of a PiezoError, or a fault of this program."""
     return str(error) if isinstance(error, PiezoError) else printable(f"fault of this program: {error!r}")

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from .channel_mapping import ChannelMapping, Samples, channel_samples
-from .errors import RecordError, printable
+from .errors import RecordError, counted, printable
 from .html_table import html_table
 from .notice import Notice
 from .picture import Pictured
@@ -105,7 +105,7 @@ class Record(Pictured):
         u, y = self.voltage, 1e6 * self.displacement
         return (
             self.phase,
-            f"{self.size} samples of {self.sample_period:g} s",
+            f"{counted(self.size, 'sample')} of {self.sample_period:g} s",
             f"{u.min():.4g} to {u.max():.4g} V",
             f"{y.min():.4g} to {y.max():.4g} µm",
         )
@@ -228,7 +228,7 @@ class Experiment(Pictured):
         )
 
     def _title(self) -> str:
-        return f"Experiment of {len(self)} phases, {self.size} samples, {len(self.notices)} findings"
+        return f"Experiment of {counted(len(self), 'phase')}, {self.size} samples, {len(self.notices)} findings"
 
     def __iter__(self) -> Iterator[Record]:
         return iter(self.records)

@@ -31,6 +31,7 @@ from rich.console import Console
 from rich.table import Table
 
 from piezo_hysteresis import Model
+from piezo_hysteresis.errors import counted
 from piezo_hysteresis.identification import DriveLimits
 from piezo_hysteresis.nodes.messages.conversions import values_of
 from piezo_hysteresis.report.figures.style import SETTINGS, canvas
@@ -140,7 +141,7 @@ class Scan:
             if values_of(best)["state"] == "done":
                 best, end = self._bench.learn()
             number = values_of(best)["phase"].rpartition("_")[2]
-            label = f"{method}, {number} corrections" if number.isdecimal() else method
+            label = f"{method}, {counted(int(number), 'correction')}" if number.isdecimal() else method
             self.runs[name].append(self._run(label, wanted, values_of(best), end.message))
 
     def _run(self, method: str, wanted: Array, values: dict[str, str], note: str) -> Run:

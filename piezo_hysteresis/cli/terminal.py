@@ -29,7 +29,7 @@ from rich.console import Console, JustifyMethod
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table as RichTable
 
-from ..errors import printable
+from ..errors import counted, printable
 from ..record import Notice
 from ..report.tables.table import Table
 
@@ -113,7 +113,7 @@ def usual_time(size: int, least: str, minutes: int) -> str:
     >>> usual_time(1_000_000, "2 s", 1)
     '1000000 samples; this usually takes 2 s to 4 min'
     """
-    return f"{size} samples; this usually takes {least} to {max(minutes, round(size / PER_MINUTE))} min"
+    return f"{counted(size, 'sample')}; this usually takes {least} to {max(minutes, round(size / PER_MINUTE))} min"
 
 
 @contextmanager

@@ -23,6 +23,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..errors import counted
 from .attempt import Order, Row, RowStatus
 from .code_hash import code_hash
 from .dispatch import finished
@@ -58,7 +59,7 @@ class FleetSummary:
         '4 recordings in 12 s: 3 done, 1 timed out.'
         """
         words = ", ".join(f"{count} {status.replace('_', ' ')}" for status, count in sorted(self.counts.items()))
-        return f"{sum(self.counts.values())} recordings in {self.seconds:.0f} s: {words or 'nothing to do'}."
+        return f"{counted(sum(self.counts.values()), 'recording')} in {self.seconds:.0f} s: {words or 'nothing to do'}."
 
 
 def settings_hash(work: Work, reading: Mapping[str, Any]) -> str:

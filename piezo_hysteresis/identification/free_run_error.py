@@ -28,7 +28,7 @@ import numpy as np
 
 from ..blocks.block import Array
 from ..effects import MainsHum
-from ..errors import RecordError
+from ..errors import IdentificationError
 from ..model.model import Model
 from ..record import CONDITIONING, Experiment, Record
 from .fit.normal_equations import Nuisance, residuals
@@ -161,7 +161,7 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
 
     Raises
     ------
-    RecordError
+    IdentificationError
         If the displacement never changes.
     ModelError
         If a record is faster than the model.
@@ -170,7 +170,7 @@ def errors(model: Model, experiment: Experiment, nuisance: Nuisance | None = Non
     """
     span = experiment.range
     if not span > 0.0:
-        raise RecordError(
+        raise IdentificationError(
             f"displacement is {experiment[0].displacement[0]:g} m in every sample, expected a stage that moves; "
             "check the sensor and its column"
         )

@@ -26,7 +26,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects import HYSTERESIS, Arx, HysteresisOperator, Offset
-from ..errors import IdentificationError
+from ..errors import IdentificationError, counted
 from ..model.model import Model
 from ..model.provenance import provenance, record_errors
 from ..model.sample_periods import identified_periods
@@ -134,7 +134,8 @@ def identify(
     longest = max(records[i].size for i in roles.fitted if roles.contents[i].span > 0.0)
     if longest < FEWEST_SAMPLES:
         raise IdentificationError(
-            f"identify: got {longest} samples in the longest record that moves, expected {FEWEST_SAMPLES} or more"
+            f"identify: got {counted(longest, 'sample')} in the longest record that moves, "
+            f"expected {FEWEST_SAMPLES} or more"
         )
     reach = max(float(np.ptp(r.displacement)) for r in records)
     if reach == 0.0:
@@ -183,7 +184,7 @@ def identify(
             notices.append(
                 Notice(
                     "delay_from_fit",
-                    f"no step was recorded; the delay of {samples} samples was taken from the dynamics",
+                    f"no step was recorded; the delay of {counted(samples, 'sample')} was taken from the dynamics",
                 )
             )
         notices += more_notices

@@ -33,7 +33,7 @@ from ..record import CONDITIONING, Record
 from .fit.normal_equations import residuals
 from .free_run_error import free_per_record
 from .records.conditioning_split import conditioning_length, covers
-from .records.excitation_check import moves
+from .records.excitation_check import SHORTEST_RECORD, check_motion, moves
 from .records.noise_floor import floors, stroke
 
 Array = NDArray[np.float64]
@@ -86,9 +86,15 @@ def check_stage(model: Model, records: Sequence[Record], known: Model | None = N
         New records, in order.
     known : Model, optional
         Model that states the known error; by default the same one.
+
+    Raises
+    ------
+    IdentificationError
+        If the stage or its drive does not move.
     """
     cut = after_a_loop(records)
     used = moving_in(cut)
+    check_motion("validate", [cut[i] for i in used])
     single, span = record_errors_of(model, cut, used), stroke(cut)
     reference = model if known is None else known
     stated = known_error(reference, LARGEST)
@@ -109,8 +115,12 @@ def record_errors_of(model: Model, records: Sequence[Record], used: Sequence[int
 
 
 def moving_in(records: Sequence[Record]) -> list[int]:
-    """Indices of the records in which the drive moves from a known state; those of unknown state if there are none."""
-    used = [i for i, r in enumerate(records) if moves(r) and r.phase != CONDITIONING]
+    """Indices of the records in which the drive moves from a known state; those of unknown state if there are none.
+
+    Records of fewer than `SHORTEST_RECORD` are left out: they show no lag.
+    """
+    long = [i for i, r in enumerate(records) if r.size >= SHORTEST_RECORD and r.phase != CONDITIONING]
+    used = [i for i in long if moves(records[i])]
     return [i for i in used if not records[i].truncated] or used
 
 

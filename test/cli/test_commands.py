@@ -79,6 +79,7 @@ def test_validate_reports_the_one_error_measure(piezo, identified, folder, tmp_p
     done = piezo("validate", identified / "model.yaml", folder, "--json", out)
     assert done.status == 0
     answer = json.loads(out.read_text())
+    assert answer["trusted"] and f"Verdict: {answer['verdict_text']}\n" in done.out
     model, experiment = model_file.load(identified / "model.yaml"), recording.read(folder)
     table = errors(model, experiment, Nuisance(offset=True))
     assert answer["percent_of_range"] == pytest.approx(table.percent)
@@ -148,6 +149,7 @@ def test_samples_that_only_determine_the_state_are_not_tested(piezo, late, tmp_p
     piezo("validate", model, tmp_path / "led_in", "--json", tmp_path / "v.json")
     answer = json.loads((tmp_path / "v.json").read_text())
     assert [t["phase"] for t in answer["residual_tests"]] == [p["phase"] for p in answer["phases"]] == ["step"]
+    assert [p["phase"] for p in answer["phases_not_judged"]] == ["conditioning"], "as in the table"
 
 
 def test_one_zero_for_all_phases_is_the_stricter_measure(piezo, identified, folder, tmp_path):

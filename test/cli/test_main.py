@@ -112,6 +112,7 @@ def files(tmp_path_factory, folder):
     recording.write(Experiment((Record(t, 1e-6 * t, 1e-6, phase="fast"),)), place / "fast")
     recording.write(Experiment((Record(t, 0 * t, 1e-3, phase="still"),)), place / "still")
     recording.write(Experiment((Record(0 * t, 1e-9 * t, 1e-3, phase="undriven"),)), place / "undriven")
+    recording.write(Experiment((Record(t[:5], 1e-6 * t[:5], 1e-3, phase="short"),)), place / "short")
     return {**{p.name.partition(".")[0]: p for p in place.iterdir()}, "experiment": folder, "place": place}
 
 
@@ -139,7 +140,6 @@ NOBODY = "there is no home folder of that user, expected another path"
         ("validate {fine} {place}/nothing", "expected a recording"),
         ("validate {fine} {empty}", "empty.npz"),
         ("validate {fine} {fast}", "decimate"),
-        ("validate {fine} {still}", "every sample"),
         ("validate {fine} {experiment} --json {place}/no/where.json", "is no folder, expected one that exists"),
         ("validate {fine} {experiment} --column voltage", "--column: got 'voltage', expected NAME=VALUE"),
         ("validate {fine} {experiment} --column wolt=1", "wolt"),
@@ -175,12 +175,35 @@ def test_bad_input_is_reported_in_one_line(piezo, files, line, words):
     assert done.err.count("\n") == 1
 
 
-def test_data_that_do_not_determine_a_model_exit_with_1(piezo, files, tmp_path):
-    done = piezo("identify", files["undriven"], "-o", tmp_path / "m.yaml")
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("identify {undriven} -o {place}/new.yaml", "drive does not move"),
+        ("identify {still} -o {place}/new.yaml", "displacement never changes"),
+        ("validate {fine} {undriven} --json {place}/new.json", "drive does not move"),
+        ("validate {fine} {still} --json {place}/new.json", "every sample"),
+        ("recalibrate {fine} {undriven} -o {place}/new.yaml", "drive does not move"),
+        ("recalibrate {fine} {still} -o {place}/new.yaml", "displacement never changes"),
+        ("recalibrate {fine} {short} -o {place}/new.yaml", "noise of 16 samples or more"),
+        ("diagnose {undriven} -o {place}/new.yaml", "drive does not move"),
+        ("report {still} --model {fine} -o {place}/new.html", "every sample"),
+    ],
+)
+def test_data_that_do_not_determine_the_result_exit_with_1(piezo, files, line, words):
+    done = piezo(*(word.format_map(files) for word in line.split()))
     assert done.status == 1
-    (line,) = (line for line in done.err.splitlines() if line.startswith("piezo: "))
-    assert "drive does not move" in line
-    assert not (tmp_path / "m.yaml").exists()
+    assert done.out == ""
+    (error,) = (text for text in done.err.splitlines() if text.startswith("piezo: "))
+    assert words in error
+    assert not list(files["place"].glob("new*"))
+
+
+def test_a_diagnosis_of_data_that_allow_no_verdict_exits_with_1(piezo, files, tmp_path):
+    page = tmp_path / "page.html"
+    done = piezo("diagnose", files["still"], "--model", files["fine"], "--report", page)
+    assert done.status == 1
+    assert "No verdict is possible, because of the data" in done.out
+    assert page.exists()
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from piezo_hysteresis.effects import Arx, BoucWen
-from piezo_hysteresis.errors import ModelError, RecordError
+from piezo_hysteresis.errors import IdentificationError, ModelError
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.free_run_error import drive_frequency, errors
 from piezo_hysteresis.model.model import Model
@@ -91,7 +91,7 @@ def test_one_zero_is_used_for_the_experiment_unless_it_is_free_per_record():
 
 def test_a_stage_that_does_not_move_has_no_range():
     still = Experiment((Record([0.0, 1.0], [1e-6, 1e-6], 1e-3),))
-    with pytest.raises(RecordError, match="every sample"):
+    with pytest.raises(IdentificationError, match="every sample"):
         errors(MODEL, still)
 
 

@@ -22,7 +22,6 @@ from ...discrepancy import Diagnosis, diagnose
 from ...discrepancy.choice.live_diagnosis import LiveDiagnosis
 from ...errors import IdentificationError, ParameterError
 from ...home_path import in_home
-from ...identification.records.conditioning_split import NOT_USED
 from ...model import model_file
 from ...report.figures.comparison import compare_diagnosis
 from ...report.json_file import write_json
@@ -71,7 +70,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Diagnose, print and save; returns 0 for all three verdicts, or 1 if most of the data could not be used.
+    """Diagnose, print and save; returns 0 for all three verdicts, or 1 if the data cannot be trusted.
 
     Raises
     ------
@@ -108,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
     for written in (path, corrected, args.json, args.report):
         if written:
             out.print(f"wrote {written}")
-    return int(any(n.kind == NOT_USED and n.severe for n in found.experiment.notices))
+    return int(any(notice.severe for notice in found.experiment.notices))
 
 
 def _save_corrected(found: Diagnosis, path: str | None) -> str:

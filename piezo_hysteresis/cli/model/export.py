@@ -30,7 +30,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ...compensation import Band, Inverse, Limits
-from ...errors import ModelError
+from ...errors import ModelError, counted
 from ...export import c_program, fmus
 from ...export.fmu import compiler
 from ...export.inversion import inversion
@@ -103,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
     out.print(f"wrote {', '.join(files)} to {args.output}")
     out.print(f"sample period: {model.sample_period:g} s; the model takes one sample in every such period")
     if inverse is not None:
-        ahead = f"{inverse.preview} samples ({inverse.preview_time:g} s)"
+        ahead = f"{counted(inverse.preview, 'sample')} ({inverse.preview_time:g} s)"
         out.print(f"inverse: the wanted displacement must be known {ahead} ahead")
     elif why_not:
         out.print(f"no inverse was written: {why_not}")

@@ -102,8 +102,11 @@ def run(args: argparse.Namespace) -> int:
             progress=report_progress,
         )
     path = model_file.save(found.model, args.output)
+    verdict, severe = verdict_line(found), any(notice.severe for notice in found.notices)
+    trusted = found.fit.converged and describes(found.free_run_percent) and not severe
     if args.json is not None:
-        write_json(args.json, answer(found, str(path)))
+        said = {"verdict_text": verdict.removeprefix("Verdict: "), "trusted": trusted}
+        write_json(args.json, {**answer(found, str(path)), **said})
     show(parameter_table(found.model, found.fit), correlation_table(found.fit), _phases(found))
     out = console()
     if found.delay is not None:
@@ -112,9 +115,8 @@ def run(args: argparse.Namespace) -> int:
         out.print(str(comparison))
     show_notices(found.notices)
     out.print(f"wrote {path}")
-    out.print(verdict_line(found), style="bold")
-    severe = any(notice.severe for notice in found.notices)
-    return 0 if found.fit.converged and describes(found.free_run_percent) and not severe else 1
+    out.print(verdict, style="bold")
+    return 0 if trusted else 1
 
 
 def verdict_line(found: Identification) -> str:

@@ -17,12 +17,13 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from ...errors import RecordError
 from ...home_path import in_home
-from ...identification.free_run_error import Errors, free_per_record
+from ...identification.free_run_error import Error, Errors, free_per_record
 from ...identification.identified_range import outside
 from ...identification.records.comparable import comparable
 from ...identification.stage_check import check_stage
@@ -70,23 +71,26 @@ def run(args: argparse.Namespace) -> int:
     nuisances = None if args.one_zero else {"error": free_per_record(model, offset=True)}
     comparison = compare(experiment, {"error": model}, nuisances)
     now = comparison.errors["error"]
-    tests = _tests(experiment, now)
-    if args.json is not None:
-        write_json(args.json, answer(comparison, now, tests))
-    if args.figures is not None:
-        _draw(comparison, in_home(args.figures))
-    show(error_table(comparison), frequency_table(comparison), _test_table(tests))
+    tests, check = _tests(experiment, now), check_stage(model, experiment.records)
     beyond = outside(model, experiment)
-    show_notices((*experiment.notices, *conditioned, *beyond))
-    if args.figures is not None:
-        console().print(f"wrote figures to {args.figures}")
-    left, check = _left(tests), check_stage(model, experiment.records)
+    left = _left(tests)
     if describes(now.percent) and not ((left or not check.is_as_good) and is_at_floor(comparison, now)):
         left = f" {floor_sentence(comparison, now)}{left}"
     verdict = f"{stage_sentence(check, now.percent, _cause(bool(beyond)))}{left}{_caveats(experiment)}"
-    console().print(f"Verdict: {verdict}", style="bold")
+    notices = (*experiment.notices, *conditioned, *beyond)
     severe = any(notice.severe for notice in (*experiment.notices, *conditioned))
-    return 0 if can_be_trusted(check, now.percent) and not severe else 1
+    trusted = can_be_trusted(check, now.percent) and not severe
+    if args.json is not None:
+        said = {"verdict_text": verdict, "trusted": trusted, "notices": [asdict(notice) for notice in notices]}
+        write_json(args.json, {**answer(comparison, now, tests), **said})
+    if args.figures is not None:
+        _draw(comparison, in_home(args.figures))
+    show(error_table(comparison), frequency_table(comparison), _test_table(tests))
+    show_notices(notices)
+    if args.figures is not None:
+        console().print(f"wrote figures to {args.figures}")
+    console().print(f"Verdict: {verdict}", style="bold")
+    return 0 if trusted else 1
 
 
 def _left(tests: list[dict[str, Any]]) -> str:
@@ -124,21 +128,23 @@ def answer(comparison: ModelComparison, now: Errors, tests: list[dict[str, Any]]
         "zero_m": now.zero,
         "rms_m": now.rms,
         "percent_of_range": now.percent,
-        "phases": [
-            {
-                "phase": row.phase,
-                "frequency_hz": row.frequency,
-                "samples": row.size,
-                "rms_m": row.rms,
-                "percent_of_range": row.percent,
-                "largest_m": row.largest,
-                "fit_percent": row.fit,
-                "floor_m": float(comparison.floors[row.index]),
-            }
-            for row in now.judged  # without the part before the first full loop
-        ],
+        "phases": [_phase(comparison, row) for row in now.judged],  # without the part before the first full loop
+        "phases_not_judged": [_phase(comparison, row) for row in now.rows if row not in now.judged],
         "percent_of_range_by_frequency": {f"{f:g}": percent for f, percent in now.by_frequency.items()},
         "residual_tests": tests,
+    }
+
+
+def _phase(comparison: ModelComparison, row: Error) -> dict[str, Any]:
+    return {
+        "phase": row.phase,
+        "frequency_hz": row.frequency,
+        "samples": row.size,
+        "rms_m": row.rms,
+        "percent_of_range": row.percent,
+        "largest_m": row.largest,
+        "fit_percent": row.fit,
+        "floor_m": float(comparison.floors[row.index]),
     }
 
 

@@ -29,7 +29,7 @@ from ...acquisition.session import DriverSession
 from ...acquisition.settings import DriverSettings
 from ...discrepancy.choice.live_diagnosis import LiveDiagnosis, begin
 from ...discrepancy.choice.time_to_decide import ERROR_RATE, LONGEST
-from ...errors import ParameterError
+from ...errors import ParameterError, counted
 from ...home_path import in_home
 from ...identification.protocol.protocol import Protocol
 from ...record import Experiment, Record
@@ -111,7 +111,7 @@ def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
         if records:
             with uninterrupted():
                 recording.write(Experiment(tuple(records)), args.output)
-            console().print(f"wrote {len(records)} phases to {args.output}")
+            console().print(f"wrote {counted(len(records), 'phase')} to {args.output}")
     show(probability_table(live.answer()))
     return live
 

@@ -23,7 +23,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ...errors import ParameterError
+from ...errors import ParameterError, counted
 from ...fleet.attempt import RowStatus
 from ...fleet.cluster import cluster
 from ...fleet.finding import find_recordings
@@ -141,5 +141,5 @@ def _worked(args: argparse.Namespace, folder: Path) -> int:
 def _workers(client: Any) -> str:
     threads = client.nthreads()
     several = sum(count > 1 for count in threads.values())
-    said = f"{len(threads)} workers, dashboard at {client.dashboard_link}"
-    return said + (f"; {several} workers have several threads: start them with --nthreads 1" if several else "")
+    said = f"{counted(len(threads), 'worker')}, dashboard at {client.dashboard_link}"
+    return said + (f"; {several} of them with several threads: start workers with --nthreads 1" if several else "")

@@ -20,7 +20,7 @@ import argparse
 from pathlib import Path
 
 from ... import recording
-from ...errors import RecordingError
+from ...errors import RecordingError, counted
 from ...home_path import in_home
 from ...identification.records.noise_floor import noise_floors
 from ...record import Experiment
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         _show_preview(experiment, in_home(args.preview))
     if args.output is not None:
         recording.write(experiment, args.output)
-        console().print(f"wrote {len(experiment)} phases to {args.output}")
+        console().print(f"wrote {counted(len(experiment), 'phase')} to {args.output}")
     if args.json is not None:
         write_json(
             args.json,

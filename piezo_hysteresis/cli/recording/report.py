@@ -20,7 +20,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ...errors import ParameterError, RecordingError
+from ...errors import ParameterError, RecordingError, counted
 from ...home_path import in_home
 from ...identification.free_run_error import free_per_record
 from ...identification.records.comparable import comparable
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
         drawn = page(compare(experiment, models, nuisances), answer=answer, title=args.title, progress=report_progress)
     path = in_home(args.output)
     drawn.save(path)
-    console().print(f"wrote {path} and {len(drawn.drawings)} figures beside it")
+    console().print(f"wrote {path} and {counted(len(drawn.drawings), 'figure')} beside it")
     return 0
 
 

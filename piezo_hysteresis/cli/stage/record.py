@@ -30,7 +30,7 @@ from ... import recording
 from ...acquisition.phase_recorder import record_phases
 from ...acquisition.session import DriverSession
 from ...acquisition.settings import DRIVER, DriverSettings
-from ...errors import ParameterError
+from ...errors import ParameterError, counted
 from ...identification.protocol.drive_limits import DriveLimits
 from ...record import Experiment, Record
 from ...stage.back_ends import BACK_ENDS
@@ -98,7 +98,7 @@ def _write(phases: list[list[Record]], output: str) -> str:
         return "nothing was written"
     with uninterrupted():
         recording.write(Experiment(tuple(records)), output)
-    return f"wrote {len(records)} records of {len(phases)} complete phases to {output}"
+    return f"wrote {counted(len(records), 'record')} of {counted(len(phases), 'complete phase')} to {output}"
 
 
 def read_stage(path: Path) -> tuple[DriverSettings, dict[str, Any]]:

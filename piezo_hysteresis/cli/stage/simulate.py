@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 
 from ... import recording
+from ...errors import counted
 from ...identification.protocol import protocol
 from ...identification.protocol.drive_limits import DriveLimits
 from ...record import Experiment, Record
@@ -79,5 +80,5 @@ def run(args: argparse.Namespace) -> int:
     recording.write(Experiment(tuple(records)), args.output)
     if args.truth is not None:
         write_json(args.truth, truth)
-    console().print(f"wrote {len(records)} phases to {args.output}")
+    console().print(f"wrote {counted(len(records), 'phase')} to {args.output}")
     return 0

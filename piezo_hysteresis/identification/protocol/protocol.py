@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ...errors import IdentificationError
+from ...errors import IdentificationError, counted
 from ...parameter import slew_text
 from . import excitation
 from .drive_limits import DriveLimits
@@ -56,8 +56,8 @@ class Summary:
 
     def __str__(self) -> str:
         return (
-            f"{self.phases} phases, {self.duration:.1f} s, {self.voltage_min:g} to {self.voltage_max:g} V, "
-            f"largest slew {slew_text(self.largest_slew, 4)}, {self.stored_samples} samples stored"
+            f"{counted(self.phases, 'phase')}, {self.duration:.1f} s, {self.voltage_min:g} to {self.voltage_max:g} V, "
+            f"largest slew {slew_text(self.largest_slew, 4)}, {counted(self.stored_samples, 'sample')} stored"
         )
 
 

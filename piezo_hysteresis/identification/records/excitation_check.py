@@ -30,6 +30,8 @@ from ..structure.pieces import Kind, pieces_of
 from .excitation_content import HELD, RINGS, SLOW, ExcitationContent, excitation_content
 from .steady_waves import SWING, find_turns
 
+SHORTEST_RECORD = 16
+"""Fewest samples of a record that is used."""
 HOLD = 1.0
 """Time for which a level must be held after a change, so that creep becomes visible [s]."""
 MOVED = 0.02
@@ -102,8 +104,8 @@ def check_motion(name: str, moving: Collection[Record]) -> None:
     """
     if not moving:
         raise IdentificationError(
-            f"{name}: the drive does not move in any record that is used; expected loops, steps or noise of 16 samples "
-            "or more, in phases other than idle and hold"
+            f"{name}: the drive does not move in any record that is used; expected loops, steps or noise of "
+            f"{SHORTEST_RECORD} samples or more, in phases other than idle and hold"
         )
     if not any(np.ptp(r.displacement) > 0.0 for r in moving):
         raise IdentificationError(

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from ...errors import IdentificationError
+from ...errors import IdentificationError, counted
 from ...record import Notice, Record
 from .step_response import StepResponse, step_response
 
@@ -92,8 +92,8 @@ class Delay:
         first = self.onsets[0]
         span = f"{first.earliest * 1e6:.4g} to {first.latest * 1e6:.4g} µs"
         return (
-            f"delay {self.samples} samples of {self.sample_period * 1e6:.4g} µs "
-            f"({span}, from {self.response.edges} edges)"
+            f"delay {counted(self.samples, 'sample')} of {self.sample_period * 1e6:.4g} µs "
+            f"({span}, from {counted(self.response.edges, 'edge')})"
         )
 
 

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from ...compensation import IterativeLearning, Limits, Plan, plan
-from ...errors import StageError, printable
+from ...errors import StageError, counted, printable
 from ...identification.protocol.phases import ProtocolPhase
 from ..identification.driver_client import DriverClient
 from ..identification.wait_limit import WaitLimit
@@ -135,7 +135,7 @@ class PathRuns:
         StageError
             If the driver refuses or stops the drive, or no samples arrive.
         """
-        self._status.show("planning", f"{wanted.size} samples", name)
+        self._status.show("planning", counted(wanted.size, "sample"), name)
         yield from self._until(lambda: applied.is_ready, "the model to be run over the applied voltages")
         found = yield from self._planned_at_rest(applied, wanted, limits)
         self.last = (name, found)
@@ -231,7 +231,7 @@ class PathRuns:
         best, last = learning.best, learning.rounds[-1]
         self.last = (name, best.plan)
         reason = ", ".join(f"{1e9 * r.rms:.1f}" for r in learning.rounds)
-        reason = f"{reason} nm rms in {len(learning.rounds)} rounds" + (
+        reason = f"{reason} nm rms in {counted(len(learning.rounds), 'round')}" + (
             f"; {learning.reason}" if learning.reason else ""
         )
         self._status.show("done", reason, name, rms=last.rms, expected=last.expected, best=best.rms)

@@ -25,6 +25,7 @@ from std_msgs.msg import Float64, String
 
 from ...acquisition.drive import Event, EventKind, Phase
 from ...acquisition.sample_block import Delivery, SampleBlock
+from ...errors import counted
 from ..messages.conversions import diagnostic, live, to_stamp
 from ..messages.samples import SampleWriter
 from ..runtime.sending import is_heard, send
@@ -105,7 +106,9 @@ class DriverTopics:
 
     def accepted(self, phase: Phase, size: int) -> None:
         """Report that a command will be played, with its number of samples."""
-        self._publish_status(DiagnosticStatus.OK, phase.name, f"{size} samples", "accepted", phase.stamp, phase.number)
+        self._publish_status(
+            DiagnosticStatus.OK, phase.name, counted(size, "sample"), "accepted", phase.stamp, phase.number
+        )
 
     def refused(self, name: str, stamp: int, reason: str) -> None:
         """Report that a command will not be played, with the reason."""

@@ -21,6 +21,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import counted
 from ...record import Notice, Record, Samples
 from .split_at_gaps import segments
 
@@ -105,7 +106,7 @@ def _stuck(record: Record) -> list[Notice]:
     ):
         if len(part):
             samples = int((part[:, 1] - part[:, 0]).sum())
-            message = text.format(float(y[part[0, 0]])) + f" for {samples} samples while the drive moves"
+            message = text.format(float(y[part[0, 0]])) + f" for {counted(samples, 'sample')} while the drive moves"
             severe = spoils or samples > _SEVERE_SHARE * record.size
             notices.append(Notice(kind, message, record.phase, severe=severe))
     return notices

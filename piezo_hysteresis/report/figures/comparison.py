@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...discrepancy import Diagnosis
-from ...errors import DivergenceError
+from ...errors import DivergenceError, IdentificationError
 from ...identification.fit.normal_equations import Nuisance
 from ...identification.free_run_error import Errors, errors, free_per_record
 from ...identification.records.noise_floor import floors, noise_floors
@@ -137,7 +137,8 @@ def compare(
 def compare_diagnosis(found: Diagnosis) -> ModelComparison:
     """The experiment of a diagnosis, with the model before and, if an effect or a change was named, after it.
 
-    The sensor zero of every record is free if it is in the gap. Without a model if one diverges on a record.
+    The sensor zero of every record is free if it is in the gap. Without a model if one diverges on a record,
+    or the displacement never changes.
     """
     models = {}
     if found.baseline is not None:
@@ -148,5 +149,5 @@ def compare_diagnosis(found: Diagnosis) -> ModelComparison:
     offset = found.gap is None or found.gap.free_zeros
     try:
         return compare(found.experiment, models, {n: free_per_record(m, offset=offset) for n, m in models.items()})
-    except DivergenceError:
+    except (DivergenceError, IdentificationError):
         return compare(found.experiment)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...errors import counted
 from ...record import Experiment
 from .drawing import Drawing
 from .style import MEASURED, canvas, styled
@@ -64,7 +65,7 @@ def preview(experiment: Experiment) -> Drawing:
         "What was understood",
         "Drive voltage and displacement against time, named by phase, and the displacement against the drive voltage. "
         "A displacement that does not follow the voltage points to a wrong column.",
-        f"{len(experiment)} phases over {end:.3g} s.",
+        f"{counted(len(experiment), 'phase')} over {end:.3g} s.",
         figure,
         data,
     )

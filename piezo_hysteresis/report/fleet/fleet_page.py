@@ -21,6 +21,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ...errors import counted
 from ..document import framed
 from ..page import Page
 from ..verdict import VerdictText
@@ -66,7 +67,7 @@ def fleet_page(history: FleetHistory) -> Page:
     verdict = VerdictText(
         f"{done} of {history.size} recordings have a result", tuple(_sentences(history, outliers, changes))
     )
-    title, about = f"Many recordings: {history.task}", f"{len(history.stages)} stages"
+    title, about = f"Many recordings: {history.task}", f"{counted(len(history.stages), 'stage')}"
     html = framed(title, history.source, about, verdict, tuple(_merit(history)), parts, FOOTER)
     return Page(html, tuple(d for drawings, _ in parts.values() for d in drawings))
 

@@ -20,6 +20,7 @@ import numpy as np
 from bokeh.document import Document
 from bokeh.models import Select
 
+from ...errors import counted
 from ..figures.comparison import ModelComparison
 from ..words import duration
 from . import recording_panels
@@ -74,7 +75,7 @@ class RecordingPage:
         self._figures.span(0.0, float(time[-1]) or record.sample_period)
         self._figures.draw_spectrum(self._window, self._noise)
         self._drawn: tuple[float, float] | None = None
-        words = f"{record.size} samples every {duration(record.sample_period)}, {duration(record.duration)}"
+        words = f"{counted(record.size, 'sample')} every {duration(record.sample_period)}, {duration(record.duration)}"
         self._state.text = recording_panels.record(self._comparison, index, words)
         self._tick()
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...compensation.plan import Plan
+from ...errors import counted
 from ...identification.identified_range import outside_of
 from ...model.model import Model
 from ...parameter import slew_text
@@ -43,9 +44,9 @@ def plan_table(found: Plan) -> Table:
     rows = (
         ("drive voltage", f"{found.voltage.min():.4g} to {found.voltage.max():.4g} V"),
         ("largest slew", slew_text(found.largest_slew, 4)),
-        ("duration", f"{found.voltage.size * found.sample_period:.4g} s, {found.voltage.size} samples"),
+        ("duration", f"{found.voltage.size * found.sample_period:.4g} s, {counted(found.voltage.size, 'sample')}"),
         ("way back to the first voltage", f"{1e3 * way_back * found.sample_period:.4g} ms"),
-        ("preview", f"{found.preview} samples, {1e3 * found.preview * found.sample_period:.3g} ms"),
+        ("preview", f"{counted(found.preview, 'sample')}, {1e3 * found.preview * found.sample_period:.3g} ms"),
         ("planned error", error(expected.planned)),
         ("free-run error of the model", error(expected.free_run)),
         ("uncertainty of the parameters on this path", error(expected.parameters)),
