@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .baseline import Baseline, DriveClass, drive_class
-from .false_alarm_threshold import WINDOW, false_alarm_threshold
+from .false_alarm_threshold import WINDOW, false_alarm_threshold, of_estimated_variance
 from .scatter import Scatter, beside_offset
 from .score import GROUPS, ChangeScore
 
@@ -112,17 +112,17 @@ class ChangeDetector:
         del self._window[:-WINDOW]
         sums = [np.cumsum([row[k] for row in reversed(self._window)], axis=0) for k in (0, 1)]
         gradients, weights = beside_offset(*sums)
-        variance = self._variance(scatter, weights, scatter.wander)
+        variance = self._variance(scatter, weights)
         seen = scatter.excited & (weights > 0.0)
-        statistic = np.where(seen, gradients**2 / np.where(seen, weights, 1.0) / variance, 0.0)
+        statistic = np.where(seen, gradients**2 / np.where(seen, weights * variance, 1.0), 0.0)
         at, largest = np.unravel_index(int(statistic.argmax()), statistic.shape)
         candidates = seen[at] & (np.arange(len(GROUPS)) != _OFFSET)
         if largest == _OFFSET:  # a change of another group, beside the same offset, moves it, too
             gradients, weights, candidates = sums[0], np.diagonal(sums[1], axis1=1, axis2=2), seen[at]
-            variance = self._variance(scatter, weights, _drift(sums[1], scatter.wander))
+            variance = self._variance(scatter, weights, sums[1])
         group = int(np.argmax(gradients[at] ** 2 / np.where(candidates, weights[at], np.inf)))
         return Change(
-            float(statistic[at, largest]) / self._threshold(key, scatter, score.duration),
+            float(statistic[at, largest]) / self._threshold(score.duration),
             _alike(group, sums[1][at]),
             float(gradients[at, group] / weights[at, group]),
             float(np.sqrt(variance[at, group] / weights[at, group])),
@@ -130,34 +130,37 @@ class ChangeDetector:
             True,
         )
 
-    def _variance(self, scatter: Scatter, weights: Array, drift: Array) -> Array:
-        """Variance of the sums of the window over that of independent scores (n, 5), with a drift of the groups."""
+    def _variance(self, scatter: Scatter, weights: Array, beside: Array | None = None) -> Array:
+        """Variance of the sums of the window over that of independent scores (n, 5).
+
+        A window may hold several classes of drive, each with its own correlation, drift and mean. The error of a mean
+        is common to all scores of its class. `beside` are the weights (n, 5, 5) where the offset drifts beside a group.
+        """
         length = np.arange(1, len(weights) + 1)[:, None]
-        variance = 1.0 + self._variance_of_baseline(weights)
+        classes = [row[3] for row in reversed(self._window)]
+        inflation, wander, mean = np.zeros_like(weights), np.zeros_like(weights), np.zeros_like(weights)
+        gained, there = np.diff(weights, axis=0, prepend=0.0), np.where(weights > 0.0, weights, 1.0)
+        for key in set(classes):
+            known = self._baseline.scatter[key]
+            own = np.cumsum(np.where(np.array([k == key for k in classes])[:, None], gained, 0.0), axis=0)
+            information = known.count * known.weight
+            mean += own**2 / np.where(information > 0.0, information, np.inf) / there
+            inflation += own / there * known.inflation(len(weights))
+            wander += own / there * known.wander
+        variance = 1.0 + mean
         if not self._same_offset:
             variance = variance + _squared_cosine_to_offset(scatter) * length / OFFSET_SCORES
-        return variance * scatter.inflation(len(weights)) + drift * weights
+        return variance * inflation + (wander if beside is None else _drift(beside, wander)) * weights
 
-    def _variance_of_baseline(self, weights: Array) -> Array:
-        """Variance that the uncertain mean of the baseline adds to each sum of the window, relative to that of the sum.
-
-        Every class of drive has its own mean, whose error is common to all scores of the class.
-        """
-        added = np.zeros_like(weights)
-        classes = [row[3] for row in reversed(self._window)]
-        for key in set(classes):
+    def _threshold(self, duration: float) -> float:
+        """The largest threshold of the classes of drive in the window."""
+        classes = {row[3] for row in self._window}
+        for key in classes - self._thresholds.keys():
             scatter = self._baseline.scatter[key]
-            inside = np.array([k == key for k in classes])[:, None]
-            own = np.cumsum(np.where(inside, np.diff(weights, axis=0, prepend=0.0), 0.0), axis=0)
-            information = scatter.count * scatter.weight
-            added += own**2 / np.where(information > 0.0, information, np.inf)
-        return added / np.where(weights > 0.0, weights, 1.0)
-
-    def _threshold(self, key: DriveClass, scatter: Scatter, duration: float) -> float:
-        if key not in self._thresholds:
             tested = _apart_from_offset(directions(scatter))
-            self._thresholds[key] = false_alarm_threshold(tested, self._interval / duration, scatter.memory)
-        return self._thresholds[key]
+            exact = false_alarm_threshold(tested, self._interval / duration, scatter.memory)
+            self._thresholds[key] = of_estimated_variance(exact, scatter.independent)
+        return max(self._thresholds[key] for key in classes)
 
 
 def _alike(group: int, weight: Array) -> tuple[str, ...]:
@@ -177,11 +180,11 @@ def _apart_from_offset(direction: Array) -> Array:
 
 
 def _drift(weights: Array, wander: Array) -> Array:
-    """Variance of the apparent change of each group (n, 5) by its own drift and by that of the offset."""
+    """Variance of the apparent change of each group (n, 5) by its own drift and by that of the offset (both n, 5)."""
     own = np.diagonal(weights, axis1=1, axis2=2)
     share = weights[:, :, _OFFSET] / np.where(own > 0.0, own, np.inf)
     share[:, _OFFSET] = 0.0
-    return wander + share**2 * wander[_OFFSET]
+    return wander + share**2 * wander[:, _OFFSET, None]
 
 
 def _squared_cosine_to_offset(scatter: Scatter) -> Array:

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr, stdtrit
 
 from ...blocks.kernel import kernel
 
@@ -153,6 +154,25 @@ def false_alarm_threshold(directions: Array, interval: float, memory: Array | No
     levels = levels[levels > 1.0]
     rates = 0.5 * np.log(levels / level) - 0.5 * (levels - level)
     return float(np.interp(-wanted, -rates, levels))
+
+
+def of_estimated_variance(threshold: float, independent: float) -> float:
+    """Threshold of a squared normal variable whose variance was estimated: Student's t has wider tails.
+
+    Parameters
+    ----------
+    threshold : float
+        Threshold if the variance is known.
+    independent : float
+        Number of independent values from which the variance was estimated.
+
+    Examples
+    --------
+    >>> [round(of_estimated_variance(25.0, count)) for count in (20.0, 100.0, 1e6)]
+    [54, 29, 25]
+    """
+    freedom = max(1.0, independent - 1.0)
+    return float(stdtrit(freedom, ndtr(-np.sqrt(threshold))) ** 2)
 
 
 def moving_average(memory: Array) -> Array:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .false_alarm_threshold import WINDOW, inflation
+from .misfit import SMALLEST, first_misfit, further_misfit, scale_of
 from .score import GROUPS, ChangeScore
 
 Array = NDArray[np.float64]
@@ -30,20 +31,14 @@ Array = NDArray[np.float64]
 DISTINCT = 1e-6
 """A group counts as excited if at least this share of its sensitivity remains after its mean was subtracted."""
 
-SIGNIFICANT = 3.0
-"""Smallest mean of a score, in standard errors, that counts as a systematic error of the model."""
-
-BATCHES = 10
-"""Number of successive parts of a baseline whose means give the standard error of the mean; scores are correlated."""
-
 SLOWEST_DECAY = 0.98
 """Largest ratio between the correlations of scores at successive lags; it is a correlation time of 5 s."""
 
 FEWEST_WINDOWS = 4
 """Fewest windows of scores of one class from which a drift of the misfit is estimated; they have at most `WINDOW`."""
 
-SMALLEST = 1e-10
-"""Eigenvalues below this share of the largest count as zero."""
+TURNS = 3
+"""Number of times that misfit and covariance are computed in turn."""
 
 SMALLEST_ROOT = 1e-5
 """Eigenvectors of a slope are ignored if the root of their eigenvalue is below this share of the largest root."""
@@ -65,8 +60,8 @@ class Scatter:
     count : int
         Number of scores.
     misfit : (5,) ndarray
-        Change of the groups that explains the mean score: a systematic error of the model under this drive. It does not
-        count as a change of the stage.
+        Change of the groups with which the gradients have a mean of zero: a systematic error of the model under this
+        drive. It does not count as a change of the stage.
     precision : (5, 5) ndarray
         Inverse covariance of the scores divided by the matrix roots of their slopes [1/m²]; rows and columns of groups
         that are not excited are zero.
@@ -98,12 +93,17 @@ class Scatter:
     @property
     def scale(self) -> Array:
         """Square root of the diagonal of `slope`, shape (5,); 1 where it is zero."""
-        return _scale(self.slope)
+        return scale_of(self.slope)
 
     @property
     def weight(self) -> Array:
         """Fisher information of a typical score about each group, shape (5,)."""
         return np.diag(self.gradient(ChangeScore(np.zeros(len(GROUPS)), self.slope, 0.0, 0.0, 0, 0.0))[1])
+
+    @property
+    def independent(self) -> float:
+        """Number of independent scores that know the variance of a long sum as well."""
+        return self.count / float(self.inflation(WINDOW)[-1].max())
 
     def gradient(self, score: ChangeScore) -> tuple[Array, Array]:
         """Gradient of the log likelihood of a score with respect to the groups (5,), and its Fisher information (5, 5).
@@ -114,6 +114,11 @@ class Scatter:
         weighting = root @ self.precision @ inverse
         return weighting @ (score.value - score.slope @ self.misfit), weighting @ score.slope
 
+    def gradients(self, scores: Sequence[ChangeScore]) -> tuple[Array, Array]:
+        """`gradient` of several scores, of shape (n, 5), and their information, of shape (n, 5, 5)."""
+        gradients, weights = zip(*map(self.gradient, scores), strict=True)
+        return np.array(gradients), np.array(weights)
+
     def inflation(self, longest: int) -> Array:
         """Variance of the sum of 1, 2, … `longest` scores over that of independent scores, shape (longest, 5)."""
         return inflation(self.memory, longest)
@@ -122,18 +127,15 @@ class Scatter:
     def of(cls, scores: Sequence[ChangeScore]) -> Scatter:
         """Scatter of the scores of one class."""
         slope = np.mean([s.slope for s in scores], axis=0)
-        scale, offset = _scale(slope), GROUPS.index("offset")
+        scale, offset = scale_of(slope), GROUPS.index("offset")
         apart = np.diag(slope) - slope[:, offset] ** 2 / slope[offset, offset]
         kept = np.flatnonzero((apart > DISTINCT**2 * np.diag(slope)) | (np.arange(len(GROUPS)) == offset))
-        misfit = _misfit(np.array([s.value for s in scores]), slope, kept)
-        covariance = _even_covariance(scores, misfit, scale, kept)
-        precision = np.zeros_like(slope)
-        biased = (len(scores) - kept.size - 2) / (len(scores) - 1)  # mean of the inverse of a Wishart matrix
-        precision[np.ix_(kept, kept)] = biased * np.linalg.pinv(covariance, rcond=1e-10, hermitian=True)
-        none = np.zeros((2, len(GROUPS)))
-        bare = cls(len(scores), misfit, precision, slope, none, none[0], residual_power(scores))
-        pairs = [bare.gradient(score) for score in scores]
-        gradients, weights = np.array([g for g, _ in pairs]), np.array([w for _, w in pairs])
+        misfit, none = first_misfit(np.array([s.value for s in scores]), slope, kept), np.zeros((2, len(GROUPS)))
+        bare = cls(len(scores), misfit, np.zeros_like(slope), slope, none, none[0], residual_power(scores))
+        for _ in range(TURNS):  # the weights depend on the misfit, and the misfit on the weights
+            bare = replace(bare, precision=_precision(scores, bare.misfit, scale, kept))
+            bare = replace(bare, misfit=bare.misfit + further_misfit(*bare.gradients(scores), scale))
+        gradients, weights = bare.gradients(scores)
         own = np.sqrt(np.maximum(np.diagonal(weights, axis1=1, axis2=2), _TINY))
         known = replace(bare, memory=_memory(gradients / own))
         size = min(WINDOW, len(scores) // FEWEST_WINDOWS)
@@ -160,33 +162,6 @@ def residual_power(scores: Sequence[ChangeScore]) -> float:
     return float(np.mean([s.power for s in scores]) - np.mean([s.offset for s in scores]) ** 2)
 
 
-def _scale(slope: Array) -> Array:
-    size = np.sqrt(np.diag(slope))
-    return np.where(size > 0.0, size, 1.0)
-
-
-def _misfit(values: Array, slope: Array, kept: NDArray[np.intp]) -> Array:
-    """`Scatter.misfit` of the scores `values` (n, 5).
-
-    It holds the offset, and what the scores show of the other groups beside it. A direction whose mean is not
-    significant has no misfit: divided by a small slope, its error would be a large misfit that other groups cancel, and
-    the sum would count as a change as soon as the slopes are different.
-    """
-    scale, offset = _scale(slope), GROUPS.index("offset")
-    others = kept[kept != offset]
-    inner, scores = slope / scale[:, None] / scale, values / scale
-    common = inner[others, offset] / inner[offset, offset]
-    strengths, directions = np.linalg.eigh(inner[np.ix_(others, others)] - np.outer(common, inner[offset, others]))
-    along = (scores[:, others] - np.outer(scores[:, offset], common)) @ directions
-    means = np.array([part.mean(axis=0) for part in np.array_split(along, BATCHES)])
-    error = means.std(axis=0, ddof=1) / np.sqrt(BATCHES)
-    seen = (np.abs(along.mean(axis=0)) > SIGNIFICANT * error) & (strengths > SMALLEST * strengths.max(initial=_TINY))
-    misfit = np.zeros(len(GROUPS))
-    misfit[others] = directions[:, seen] @ (along.mean(axis=0)[seen] / strengths[seen])
-    misfit[offset] = (scores[:, offset].mean() - inner[offset] @ misfit) / inner[offset, offset]
-    return misfit / scale
-
-
 def _roots(slope: Array, scale: Array, kept: NDArray[np.intp]) -> tuple[Array, Array]:
     """Root of a slope, times the scale, and the inverse of this product; both (5, 5), zero outside the kept rows."""
     values, vectors = np.linalg.eigh((slope / scale[:, None] / scale)[np.ix_(kept, kept)])
@@ -199,11 +174,20 @@ def _roots(slope: Array, scale: Array, kept: NDArray[np.intp]) -> tuple[Array, A
     return root, inverse
 
 
+def _precision(scores: Sequence[ChangeScore], misfit: Array, scale: Array, kept: NDArray[np.intp]) -> Array:
+    """`Scatter.precision` about a misfit."""
+    precision = np.zeros((len(GROUPS), len(GROUPS)))
+    biased = (len(scores) - kept.size - 2) / (len(scores) - 1)  # mean of the inverse of a Wishart matrix
+    inverse = np.linalg.pinv(_even_covariance(scores, misfit, scale, kept), rcond=SMALLEST, hermitian=True)
+    precision[np.ix_(kept, kept)] = biased * inverse
+    return precision
+
+
 def _even_covariance(scores: Sequence[ChangeScore], misfit: Array, scale: Array, kept: NDArray[np.intp]) -> Array:
     """Covariance of the scores divided by the roots of their slopes [m²], shape (k, k).
 
-    In a block that does not excite a direction, this direction gets the mean variance of the excited directions.
-    Otherwise its variance would be too small, and the first block that excites it would count as a change.
+    In a block that does not excite a direction, this direction gets the mean variance of the excited ones. Otherwise
+    the first block that excites it would count as a change.
     """
     even, excited = [], []
     for s in scores:
@@ -219,8 +203,7 @@ def _even_covariance(scores: Sequence[ChangeScore], misfit: Array, scale: Array,
 def _memory(series: Array) -> Array:
     """`Scatter.memory` of a series (n, 5).
 
-    The decay is zero where the first correlation is not above two standard errors. The first correlation of an
-    ARMA(1, 1) series is at most (1 + decay) / 2.
+    The decay is zero where the first correlation, at most (1 + decay) / 2, is not above two standard errors.
     """
     power = np.maximum((series**2).mean(axis=0), _TINY)
     one, two = ((series[lag:] * series[:-lag]).mean(axis=0) / power for lag in (1, 2))
