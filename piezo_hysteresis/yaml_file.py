@@ -38,15 +38,15 @@ class _PlainLoader(yaml.SafeLoader):  # type: ignore[misc]  # yaml carries no ty
         return super().compose_node(parent, index)
 
 
-def read_regular_file(path: Path, longest: int) -> bytes:
-    """Up to `longest` bytes of a regular file; never waits for a pipe or a device.
+def read_regular_file(path: Path, longest: int = -1) -> bytes:
+    """The bytes of a regular file, up to `longest`; never waits for a pipe or a device.
 
     Parameters
     ----------
     path : Path
         The file.
     longest : int
-        Largest number of bytes to read.
+        Largest number of bytes to read; by default all.
 
     Raises
     ------

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..home_path import in_home
+from ..yaml_file import read_regular_file
 from .table.column_inference import inferred_columns, named_column, unit_in
 from .table.dialect import decoded
 from .table.units import si_factor
@@ -60,6 +61,7 @@ def read_path(path: str | Path) -> tuple[Array, float | None]:
 
 def _from_npz(place: Path) -> tuple[Array, float | None]:
     try:
+        read_regular_file(place, 1)
         with place.open("rb") as file, zipfile.ZipFile(file):  # np.load takes other files for pickled objects
             pass
         with np.load(place, allow_pickle=False) as held:
@@ -75,7 +77,7 @@ def _from_npz(place: Path) -> tuple[Array, float | None]:
 
 def _from_csv(place: Path) -> tuple[Array, float | None]:
     try:
-        lines = decoded(place.read_bytes()).splitlines()
+        lines = decoded(read_regular_file(place)).splitlines()
         rows = [row for row in csv.reader(lines) if row and not row[0].startswith("#")]
     except csv.Error as error:
         raise RecordingError(f"{place}: no CSV that can be read ({error})") from None

@@ -23,6 +23,7 @@ from typing import Any
 
 from ..errors import RecordingError
 from ..home_path import in_home
+from ..yaml_file import read_regular_file
 
 
 def write_json(path: str, answer: Mapping[str, Any]) -> None:
@@ -56,7 +57,9 @@ def read_json(path: str) -> dict[str, Any]:
     """
     place = in_home(path)
     try:
-        answer = json.loads(place.read_text(encoding="utf-8"))
+        answer = json.loads(read_regular_file(place))
+    except RecordingError:
+        raise
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}, expected a JSON file") from None
     except (ValueError, RecursionError):

@@ -108,6 +108,8 @@ def files(tmp_path_factory, folder):
     )
     (place / "empty.npz").write_bytes(b"")
     (place / "list.json").write_text("[1]")
+    os.mkfifo(place / "pipe.csv")
+    os.mkfifo(place / "zipped.npz")
     t = np.arange(50.0)
     recording.write(Experiment((Record(t, 1e-6 * t, 1e-6, phase="fast"),)), place / "fast")
     recording.write(Experiment((Record(t, 0 * t, 1e-3, phase="still"),)), place / "still")
@@ -149,6 +151,11 @@ NOBODY = "there is no home folder of that user, expected another path"
         ("validate {fine} {experiment} --rows 5", "expected FROM:TO"),
         ("validate {fine} {experiment} --sample-period -1", "expected a positive time"),
         ("validate {fine} {experiment} --phase 0=a --phase b", "TIME=NAME"),
+        ("validate {fine} {experiment} --phase nan=a", "--phase: got the times nan, expected finite ones"),
+        ("compensate {fine} {pipe} -o {place}/c.npz", "expected a regular file"),
+        ("compensate {fine} {zipped} -o {place}/c.npz", "expected a regular file"),
+        ("history {pipe}", "expected a regular file"),
+        ("report {experiment} --answer {pipe} -o {place}/r.html", "expected a regular file"),
         ("identify {experiment} -o {place}/x.yaml --json {place}/x.yaml", "expected another file"),
         ("identify {experiment} -o {place}/x.yaml --taps 7", "--taps: got 7 for a stage of one axis"),
         ("report {experiment} --answer {fine}", "no JSON"),

@@ -24,6 +24,7 @@ from rich.table import Table
 from ...changes.recalibration_history import FILE, read_numbers
 from ...errors import RecordingError
 from ...home_path import in_home
+from ...yaml_file import read_regular_file
 from ..options.destination import add_force, require_new_results
 from ..terminal import console
 
@@ -49,7 +50,9 @@ def run(args: argparse.Namespace) -> int:
     path = in_home(args.file)
     path = path / FILE if path.is_dir() else path
     try:
-        numbers = read_numbers(path.read_text(encoding="utf-8"), str(path))
+        numbers = read_numbers(read_regular_file(path).decode(), str(path))
+    except RecordingError:
+        raise
     except (OSError, UnicodeDecodeError) as error:
         raise RecordingError(
             f"{path}: cannot be read ({getattr(error, 'strerror', None) or error}), expected {FILE} of a model node"

@@ -121,6 +121,9 @@ class ReadOptions:
             raise RecordingError(f"`include`: got '{unknown[0]}', expected some of {', '.join(LEFT_OUT)}")
         if self.initial_voltage is not None and not math.isfinite(self.initial_voltage):
             raise RecordingError(f"`initial_voltage`: got {self.initial_voltage!r} V, expected a finite voltage")
+        times = [] if self.phases is None or isinstance(self.phases, str) else [time for time, _ in self.phases]
+        if not all(map(math.isfinite, times)):
+            raise RecordingError(f"`phases`: got the times {', '.join(map(str, times))}, expected finite ones in s")
         if self.average is not None and self.average < 1:
             raise RecordingError(f"`average`: got {self.average}, expected a whole number of samples, 1 or more")
         first, last = self.rows or (None, None)
