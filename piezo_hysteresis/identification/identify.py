@@ -196,23 +196,25 @@ def identify(
         noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
         comparisons, more_notices = compare_inputs(joint.model, records, noise, samples, chosen)
         notices += more_notices
-    elif memory and start.hysteresis.memoryless() is not None:
-        quiet = [max(noise, ADEQUACY * reach) for noise in sensor_noise(records)]
-        choice = choose_structure(
-            natural.of_model(start), records, quiet, roles.fitted, lambda word, part: report(word, 0.2 + 0.7 * part)
-        )
-        joint = gauge.of_fit(choice.fit)
-        structure = replace(choice, fit=joint)
-        notices += choice.notices
     else:
-        report("joint fit", 0.3)
-        used = steps_apart(records, floors, roles.fitted)
-        joint = fit_lag(start, *used)
-        corrected, more_notices = without_intersample_error(joint.model, records, floors, roles.fitted)
-        notices += more_notices
-        if corrected is not records:
-            records, used = corrected, steps_apart(corrected, floors, roles.fitted)
-            joint = fit_lag(joint.model, *used)
+        chooses = memory and start.hysteresis.memoryless() is not None
+        if not chooses or any(r.sample_period > 1.001 * period for r in records):
+            report("joint fit", 0.2)
+            used = steps_apart(records, floors, roles.fitted)
+            joint = fit_lag(start, *used)
+            corrected, more_notices = without_intersample_error(joint.model, records, floors, roles.fitted)
+            notices += more_notices
+            if corrected is not records:
+                records, used = corrected, steps_apart(corrected, floors, roles.fitted)
+                joint = joint if chooses else fit_lag(joint.model, *used)
+        if chooses:
+            quiet = [max(noise, ADEQUACY * reach) for noise in sensor_noise(records)]
+            choice = choose_structure(
+                natural.of_model(start), records, quiet, roles.fitted, lambda word, part: report(word, 0.2 + 0.7 * part)
+            )
+            joint = gauge.of_fit(choice.fit)
+            structure = replace(choice, fit=joint)
+            notices += choice.notices
     if memory and roles.broadband:
         report("memory of the hysteresis", 0.9)
         joint, more_notices = choose_memory(joint, records, floors, roles.fitted, roles.loops)
