@@ -28,6 +28,7 @@ from ..effects import HYSTERESIS, Arx
 from ..errors import IdentificationError
 from ..model.model import Model
 from ..record import CONDITIONING, Experiment, Record
+from .fit.gauge import Gauge
 from .identify import identify
 from .records.roles import Roles, roles_of
 from .steps.delay import identify_delay
@@ -69,10 +70,9 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
         delay = max(1, identify_delay([r for r in fast if r.phase.startswith("step")] or fast).samples)
     except IdentificationError:
         delay = None
-    voltage = max(float(max(r.voltage.max(), -r.voltage.min())) for r in records)
-    reach = max(float(r.displacement.max() - r.displacement.min()) for r in records)
-    loop = (HYSTERESIS(), Arx(a=(), b=(1.0,), delay=delay or 1))
-    frame = Model(loop, experiment.fastest_period, voltage, reach)
+    gauge = Gauge.natural(records, loops)
+    loop = (HYSTERESIS(), Arx(a=(), b=(gauge.gain,), delay=delay or 1))
+    frame = Model(loop, experiment.fastest_period, gauge.voltage_scale, gauge.displacement_scale)
     start = fit_hysteresis(frame, records, loops).model
     delay = delay or _delay_without_steps(start, records, broadband)
     for iterations in (ITERATIONS, FEW_ITERATIONS):

@@ -47,6 +47,19 @@ def test_noise_that_does_not_determine_the_sign_of_the_gain_gives_a_start():
         assert dynamics_of(start).dc_gain > 0.0
 
 
+def test_a_sensor_of_reversed_sign_has_a_negative_gain():
+    """With a hysteresis that falls with the drive, no plays were found, and the answer was "unknown"."""
+    stage = Model((BoucWen(), Arx(a=[-0.6], b=[0.4], delay=2.0)), PERIOD, 10.0, 1e-5)
+    time = PERIOD * np.arange(10_000)
+    voltage = 5.0 * (1.0 - np.abs(2.0 * np.mod(time, 1.0) - 1.0))
+    noise = 5.0 + 0.1 * np.random.default_rng(0).normal(size=10_000)
+    drives = {"triangle": voltage, "noise": noise}
+    records = [Record(u, -stage.simulate(u), PERIOD, phase) for phase, u in drives.items()]
+    for start in start_models(records, (0, 1)):
+        assert dynamics_of(start).dc_gain == pytest.approx(-1.0)
+        assert start.hysteresis["p2"] > 0.0
+
+
 def test_a_start_from_which_the_fit_fails_hides_no_later_one(monkeypatch):
     first, second, third = (
         exact(Model((BoucWen(), Arx(a=(), b=(1.0,), delay=d)), PERIOD, 10.0, 1e-5)) for d in (1, 2, 3)
