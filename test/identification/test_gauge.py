@@ -24,6 +24,7 @@ from piezo_hysteresis.errors import ParameterError
 from piezo_hysteresis.fleet.work_result import fitted_parameters
 from piezo_hysteresis.identification.fit.gauge import Gauge
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.steps.comparison import compare_inputs
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 
@@ -74,3 +75,18 @@ def test_a_gain_of_the_other_sign_is_refused():
     assert natural == Gauge(10.0, natural.displacement_scale, 1.0)
     with pytest.raises(ParameterError, match=r"gain: got -2, .* expected 2"):
         replace(natural, gain=-2.0).of_model(STAGE)
+
+
+def test_a_sensor_of_reversed_sign_is_no_lag():
+    """The lag was half a period of 500 Hz too small, and negative."""
+    arx = Arx(a=(-1.2, 0.45), b=(0.15, 0.1), delay=3.0)
+    model = Model((BoucWen(), arx), 1e-4, 10.0, 1e-5)
+    drive = 5.0 + np.random.default_rng(1).standard_normal(4000)
+    found = []
+    for sign in (1.0, -1.0):
+        stage = model.with_values({f"arx.b[{k}]": sign * b for k, b in enumerate(arx.array("b"))})
+        record = Record(drive, stage.simulate(drive), 1e-4, "noise")
+        (comparison,), _ = compare_inputs(stage, [record], [0], 3, (2, 2))
+        found.append([comparison.lag_from_v, comparison.lag_from_w])
+    assert found[0][1] == pytest.approx(arx.group_delay * 1e-4, rel=0.05)
+    assert found[1] == pytest.approx(found[0])

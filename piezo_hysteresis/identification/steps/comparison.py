@@ -72,7 +72,8 @@ class InputComparison:
 
 def _shape(dynamics: Dynamics) -> tuple[float, float, float]:
     low, high = dynamics.response(np.array([LOW, HIGH]))
-    return abs(low) / abs(high), float(-np.angle(high)) / (2.0 * np.pi * HIGH), abs(high)
+    turned = -np.angle(high * np.sign(low.real))  # a reversed sensor is no lag
+    return abs(low) / abs(high), float(turned) / (2.0 * np.pi * HIGH), abs(high)
 
 
 def compare_inputs(
