@@ -113,7 +113,7 @@ def identify(
     RecordError
         If `experiment` holds no records or one of several drives, or `held_out` names a phase that it does not have.
     ParameterError
-        If a scale is not positive, or `gain` is 0.
+        If a scale is not positive, or `gain` is 0, or has the wrong sign for plays.
 
     Notes
     -----
@@ -208,6 +208,7 @@ def identify(
                 records, used = corrected, steps_apart(corrected, floors, roles.fitted)
                 joint = joint if chooses else fit_lag(joint.model, *used)
         if chooses:
+            gauge.require_sign(natural)
             quiet = [max(noise, ADEQUACY * reach) for noise in sensor_noise(records)]
             choice = choose_structure(
                 natural.of_model(start), records, quiet, roles.fitted, lambda word, part: report(word, 0.2 + 0.7 * part)

@@ -70,11 +70,20 @@ def test_scales_and_gain_change_no_displacement():
 
 
 def test_a_gain_of_the_other_sign_is_refused():
+    """The message named the gain that was expected as the one that was given."""
     loops = recorded()
     natural = Gauge.natural(loops, (0,))
     assert natural == Gauge(10.0, natural.displacement_scale, 1.0)
     with pytest.raises(ParameterError, match=r"gain: got -2, .* expected 2"):
-        replace(natural, gain=-2.0).of_model(STAGE)
+        replace(natural, gain=-2.0).require_sign(natural)
+    with pytest.raises(ParameterError, match=r"gain: got -2, .* expected 2"):
+        identify(loops, memory=True, gain=-2.0)
+
+
+def test_a_record_of_one_sample_shows_no_direction():
+    """Its covariance was not a number, and with it the sign of the whole stage was lost."""
+    one = Record([0.0], [0.0], 1e-3, "triangle", initial_voltage=10.0)
+    assert Gauge.natural([one, *recorded(-1.0)], (0, 1)).gain == -1.0
 
 
 def test_a_sensor_of_reversed_sign_is_no_lag():

@@ -57,12 +57,20 @@ class Gauge:
         loops : collection of int
             Indices of the records that show in which direction the stage moves.
         """
-        along = sum(float(np.cov(records[i].voltage, records[i].displacement)[0, 1]) for i in loops)
+        along = sum(float(np.cov(records[i].voltage, records[i].displacement, bias=True)[0, 1]) for i in loops)
         return cls(
             max(float(np.max(np.abs(r.voltage))) for r in records),
             max(float(np.ptp(r.displacement)) for r in records),
             -1.0 if along < 0.0 else 1.0,
         )
+
+    def require_sign(self, natural: Gauge) -> None:
+        """Raise ParameterError if G(1) has not the sign of the natural gauge."""
+        if self.gain * natural.gain < 0.0:
+            raise ParameterError(
+                f"gain: got {self.gain:g}, with which w falls with the drive; expected {-self.gain:g} for this stage, "
+                "because plays have no negative weights"
+            )
 
     def of_model(self, model: Model) -> Model:
         """A model of hysteresis, creep and dynamics in this gauge; its displacement stays the same.
@@ -70,13 +78,8 @@ class Gauge:
         Raises
         ------
         ParameterError
-            If G(1) has the other sign, or a parameter is beyond its bounds in this gauge.
+            If a parameter is beyond its bounds in this gauge.
         """
-        if self.gain * model.effect(Arx).dc_gain < 0.0:
-            raise ParameterError(
-                f"gain: got {self.gain:g}, with which w falls with the drive; expected {-self.gain:g} for this stage, "
-                "because plays have no negative weights"
-            )
         values = {name: value * self._factor(model, name) for name, value in model.values().items()}
         model = replace(model, voltage_scale=self.voltage_scale, displacement_scale=self.displacement_scale)
         return model.with_values(values)
