@@ -77,7 +77,7 @@ class ModelNode(GuardedNode):
                 self._follow(self._usable(self._values["model_file"]))
             except PiezoError as error:
                 self._diagnostics.refused(f"model_file: {error}")
-        let_change(self, MODEL, "model_file", self._usable, self._follow)
+        let_change(self, MODEL, "model_file", self._usable, self._switch)
         subscribe(self, "model", self._on_model)
         subscribe(self, "samples", self._on_samples, deep=True, raw=True)
         self.create_service(Trigger, "~/zero", self._on_zero)
@@ -151,6 +151,13 @@ class ModelNode(GuardedNode):
         if self._predictor is not None:
             model.at(self._predictor.sample_period)
         return model
+
+    def _switch(self, model: Model) -> None:
+        """Follow the model of a file; if it diverges on the voltages so far, the present one stays."""
+        try:
+            self._follow(model)
+        except PiezoError as error:
+            self._diagnostics.refused(f"model_file: {error}")
 
     def _follow(self, model: Model, offset: float | None = None) -> None:
         if self._predictor is not None:

@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rcl_interfaces.srv import SetParametersAtomically
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64, String
@@ -191,6 +191,21 @@ def test_a_model_on_the_topic_takes_over_between_two_blocks(lab, tmp_path):
         np.testing.assert_array_equal(got["prediction"], answers_of(predictor, block))
         assert (got["model"] == hash_number(OTHER if number < 20 else MODEL)).all()
     assert np.abs(np.concatenate([got["residual"] for got in predicted[20:]])).max() < 6e-8
+
+
+def test_a_file_whose_model_runs_away_is_reported_and_the_present_model_stays(lab, tmp_path):
+    """The answer of the service was empty, and the diagnostics spoke of a fault."""
+    bench = Bench(lab, model_file=str(save(MODEL, tmp_path / "model.yaml")))
+    blocks = stream(30)
+    bench.send(blocks[:20])
+    bench.predicted(20)
+    wild = Model((BoucWen(p2=1000.0), Arx(b=[1e6, 1e6, 1e6, 1e6])), PERIOD)
+    parameter = Parameter("model_file", value=str(save(wild, tmp_path / "wild.yaml"))).to_parameter_msg()
+    request = SetParameters.Request(parameters=[parameter])
+    assert len(lab.call(SetParameters, "model_node/set_parameters", request).results) == 1
+    assert bench.report("model_file: ")["faults"] == "0"
+    bench.send(blocks[20:])
+    assert (bench.predicted(30)[-1]["model"] == hash_number(MODEL)).all()
 
 
 def test_bad_blocks_and_bad_parameters_are_reported_and_the_node_runs_on(lab, tmp_path):
