@@ -80,3 +80,12 @@ def test_a_step_at_the_beginning_of_a_long_record_is_not_averaged(period, freque
     assert found.selection.score.excess == pytest.approx(1.0, abs=0.1)
     assert found.verdict is Verdict.NOTHING_MISSING or len(frequencies) < 4
     assert found.gap.after <= found.gap.before
+
+
+def test_effects_whose_start_values_are_beyond_their_bounds_are_left_out():
+    """A drive of millivolts, as from a wrong unit, ended the diagnosis: 'hysteresis_memory.reach: got 0.0005'."""
+    given = Model((BoucWen(), Arx(b=(1.0,))), 0.1, 10.0, 1e-5)
+    t = given.sample_period * np.arange(400)
+    drive = 5e-3 * (1.0 - np.cos(0.1 * np.pi * t))
+    measured = given.simulate(drive) + 2e-10 * np.sin(0.9 * t)
+    assert diagnose([Record(drive, measured, given.sample_period)], given).verdict is not Verdict.NAMED

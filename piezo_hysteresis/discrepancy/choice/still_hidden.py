@@ -33,7 +33,7 @@ from ...identification.protocol.phases import ProtocolPhase
 from ...identification.records.noise_floor import ADEQUATE
 from ...model.model import Model
 from ...record import Record
-from ..search.candidates import adjusted_numbers, directions
+from ..search.candidates import adjusted_numbers, directions, starts_of
 from ..search.refit import FAILURES
 from ..search.training_data import TrainingData
 
@@ -77,7 +77,7 @@ def still_hidden(
     records = [p.as_record(float(t)) for p, t in zip(phases, starts_at, strict=True)]
     found = set[str]()
     for effect in effects:
-        starts = effect.starts(training_data.extent) if effect.channel is None else ()
+        starts = starts_of(effect, training_data.extent) if effect.channel is None else ()
         for start in (s for s in starts if s.is_off):
             try:
                 may_show = _may_show(model.with_effect(start), start.name, model, training_data, records, z) / floor**2

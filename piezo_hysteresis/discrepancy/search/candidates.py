@@ -31,6 +31,7 @@ import numpy as np
 
 from ...blocks.block import Array
 from ...effects import Arx, Effect, MainsHum, Offset
+from ...effects.extent import Extent
 from ...errors import DivergenceError, ModelError, ParameterError
 from ...identification.cores import on_cores
 from ...identification.fit.bounded_step import gauge, room_of
@@ -145,7 +146,7 @@ def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Eff
     """
     base = adjusted_numbers(model, training_data)
     starts = [
-        (effect, effect.starts(training_data.extent)) for effect in effects if _fits(model, training_data, effect)
+        (effect, starts_of(effect, training_data.extent)) for effect in effects if _fits(model, training_data, effect)
     ]
     groups: list[list[Effect]] = [[s for _, many in starts for s in many if not s.is_off]]
     for turn in range(max((len(s) for _, s in starts), default=0)):
@@ -157,6 +158,14 @@ def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Eff
             if candidate.name not in best or candidate.score.cost < best[candidate.name].score.cost:
                 best[candidate.name] = candidate
     return sorted(best.values(), key=BY_COST)
+
+
+def starts_of(effect: type[Effect], extent: Extent) -> tuple[Effect, ...]:
+    """Start values of an effect; none where the ranges of the records are beyond its bounds."""
+    try:
+        return effect.starts(extent)
+    except ParameterError:
+        return ()
 
 
 def _screen_group(model: Model, training_data: TrainingData, base: list[str], group: list[Effect]) -> list[Candidate]:
