@@ -154,8 +154,8 @@ def grams(
         product = np.empty((len(wanted) + len(others),) * 2)
         own, rest = slice(len(wanted)), slice(len(wanted), None)
         product[own, own] = (slopes @ slopes.T)[np.ix_(order, order)]
-        product[rest, own] = (others @ slopes.T)[:, order]
-        product[own, rest], product[rest, rest] = product[rest, own].T, others @ others.T
+        product[own, rest] = np.array([slopes @ row for row in others]).T[order]
+        product[rest, own], product[rest, rest] = product[own, rest].T, others @ others.T
         if not np.abs(product).max() < RUNAWAY:
             raise DivergenceError(model.effects[-1].name, part.start, part.start * record.sample_period)
         if index == len(sums):
