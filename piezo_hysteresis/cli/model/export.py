@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     files = (c_program if args.to == "c" else fmus)(model, args.name, inverse)
     _write(files, in_home(args.output))
     out = console()
-    old = Path(args.output).expanduser() / f"{args.name}_inverse.fmu"
+    old = in_home(args.output) / f"{args.name}_inverse.fmu"
     if args.to == "fmu" and inverse is None and old.is_file():  # of an earlier model
         old.unlink()
         out.print(f"removed {old.name}, which was there before: it is not the inverse of this model")
