@@ -94,9 +94,9 @@ def run(args: argparse.Namespace) -> int:
     model = model_file.load(args.model)
     inverse, why_not = _inverse(model, args)
     files = (c_program if args.to == "c" else fmus)(model, args.name, inverse)
-    _write(files, in_home(args.output))
-    out = console()
-    old = in_home(args.output) / f"{args.name}_inverse.fmu"
+    folder, out = in_home(args.output), console()
+    _write(files, folder)
+    old = folder / f"{args.name}_inverse.fmu"
     if args.to == "fmu" and inverse is None and old.is_file():  # of an earlier model
         old.unlink()
         out.print(f"removed {old.name}, which was there before: it is not the inverse of this model")
