@@ -34,7 +34,7 @@ from piezo_hysteresis.stage.hidden import hidden_effect
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
-HUM = Case("poor", ("mains_hum",), 1, 5e-4, "packaged")
+HUM = Case("poor", ("mains_hum",), 1, 3e-4, "packaged")
 
 
 def recorded(seed):

@@ -30,11 +30,11 @@ from ...errors import DivergenceError, IdentificationError, ModelError, Paramete
 from ...identification.cores import on_cores
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit, fit
-from ...identification.fit.normal_equations import Linearised
+from ...identification.fit.normal_equations import Linearised, residuals
 from ...identification.fit.time_limit import check_time
 from ...identification.records.noise_floor import ADEQUATE
 from ...identification.steps.dynamics import Dynamics, best_arx, identify_arx
-from ...identification.steps.linear_start import FEW_ITERATIONS, ITERATIONS, form_of, hysteresis_signals, with_dynamics
+from ...identification.steps.linear_start import FEW_ITERATIONS, ITERATIONS, dynamics_signals, form_of, with_dynamics
 from ...identification.steps.modes import identify_modes
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate, adjusted_numbers, linearised, score_model
@@ -181,7 +181,8 @@ def _behind_anew(
         return scored(with_dynamics(model, dynamics.arx), training_data)
 
     with suppress(*FAILURES):
-        signals = hysteresis_signals(model, training_data.records, broadband)
+        left = residuals(model, training_data.records, training_data.free_with(model))
+        signals = dynamics_signals(model, training_data.records, broadband, left)
         with suppress(*FAILURES):
             for dynamics in best_arx(signals, *form_of(model), choices):
                 with suppress(*FAILURES):
@@ -216,9 +217,9 @@ def _absorbed(model: Model, extended: Model, training_data: TrainingData) -> Mod
     broadband = training_data.broadband
     if not broadband:
         return None
-    inputs = hysteresis_signals(model, training_data.records, broadband)
-    outputs = extended.free_run(training_data.records)
-    signals = [(w, outputs[i] / model.displacement_scale) for (w, _), i in zip(inputs, broadband, strict=True)]
+    records = training_data.records
+    missed = [a - b for a, b in zip(extended.free_run(records), model.free_run(records), strict=True)]
+    signals = dynamics_signals(model, records, broadband, missed)
     with suppress(IdentificationError, ParameterError, DivergenceError):
         return with_dynamics(model, identify_arx(signals, *form_of(model), ITERATIONS).arx)
     return None

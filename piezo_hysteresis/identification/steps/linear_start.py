@@ -24,6 +24,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from ...blocks.block import Array
 from ...effects import Arx, ChainPosition
 from ...errors import IdentificationError
 from ...model.model import Model
@@ -45,6 +46,24 @@ def hysteresis_signals(model: Model, records: Sequence[Record], wanted: Collecti
     kept = with_conditioning(records, wanted)
     outputs = dict(zip(kept, alone.free_run([records[i] for i in kept]), strict=True))
     return [(outputs[i], np.array(records[i].displacement / model.displacement_scale)) for i in sorted(wanted)]
+
+
+def dynamics_signals(
+    model: Model, records: Sequence[Record], wanted: Collection[int], left: Sequence[Array]
+) -> Signals:
+    """(w, x) of the records `wanted`: hysteresis output of the model, and what dynamics behind it have to give.
+
+    That is what its present dynamics give, and what the whole model leaves [m]. So x is free of all that the model has
+    behind the dynamics, e.g. hum.
+    """
+    through = tuple(e for e in model.effects if e.place < ChainPosition.DYNAMICS or isinstance(e, Arx))
+    kept = with_conditioning(records, wanted)
+    moved = Model(through, model.sample_period, model.voltage_scale).free_run([records[i] for i in kept])
+    given = dict(zip(kept, moved, strict=True))
+    inputs = hysteresis_signals(model, records, wanted)
+    return [
+        (w, given[i] + left[i] / model.displacement_scale) for i, (w, _) in zip(sorted(wanted), inputs, strict=True)
+    ]
 
 
 def dynamics_behind(

@@ -17,11 +17,12 @@
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from piezo_hysteresis.discrepancy.search.candidates import Candidate, score_model
 from piezo_hysteresis.discrepancy.search.refit import proceed, refit, restart
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
-from piezo_hysteresis.effects import HYSTERESIS, AmplifierSlewLimit, Arx, Offset
+from piezo_hysteresis.effects import HYSTERESIS, AmplifierSlewLimit, Arx, MainsHum, Offset
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.records.noise_floor import ADEQUATE
 from piezo_hysteresis.model.model import Model
@@ -56,3 +57,20 @@ def test_a_loop_that_lost_its_width_is_started_again():
     assert found is not None
     assert proceed(found).score.excess > 10.0 * ADEQUATE
     assert restart(found, 9).score.excess < ADEQUATE
+
+
+def test_dynamics_are_estimated_anew_without_the_hum_of_the_recordings():
+    """Hum, which the model has behind the dynamics, was taken for motion of the stage: V was 248."""
+    rng, hum = np.random.default_rng(1), MainsHum(f=50.0)
+    drives = [5.0 + scipy.ndimage.gaussian_filter1d(rng.normal(0.0, 5.0, 6000), 3) for _ in range(3)]
+    at = PERIOD * np.arange(6000)
+    records = tuple(
+        Record(u, y + 5e-7 * np.cos(2.0 * np.pi * 50.0 * at + phase) + NOISE * rng.normal(size=u.size), PERIOD)
+        for phase, (u, y) in enumerate((u, STAGE.simulate([Record(u, u, PERIOD)])[0]) for u in drives)
+    )
+    data = TrainingData(records, np.full(len(records), NOISE), Extent.of(records, 10.0, 1e-5), start=None)
+    other = STAGE.with_effect(Arx(a=(-1.2, 0.4), b=(0.2,)))
+    begun = refit(other, Candidate(hum, data, score_model(other.with_effect(hum), data)), 1)
+    assert begun is not None
+    assert begun.score.excess > 10.0
+    assert restart(begun, 1).score.excess < 1.1
