@@ -155,6 +155,19 @@ def test_jitter_of_the_clock_counts_in_every_record_by_its_speed():
     assert noise_floors(records) == pytest.approx(expected, rel=0.1)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_chance_in_a_slow_record_is_no_jitter_of_fast_ones(seed):
+    """With a slow triangle as the only periodic record, the floor of a fast one was up to 27 times the noise."""
+    rng = np.random.default_rng(seed)
+    slow = 100 * np.abs(np.mod(np.arange(1200) / 400 + 0.5, 1.0) * 2 - 1)
+    fast = 50 + scipy.ndimage.gaussian_filter1d(rng.normal(0, 100, 6000), 10)
+    records = tuple(
+        Record(drive, 1e-7 * drive + SIGMA * rng.normal(size=drive.size), period)
+        for drive, period in ((slow, 2.5e-3), (fast, 1e-4))
+    )
+    assert noise_floors(records)[1] == pytest.approx(SIGMA, rel=0.2)
+
+
 def ringing_stage(drive, frequency, damping, noise):
     """A stage with a play and one mode, sampled at 10 kHz; noise as a share of the range."""
     loop, last = np.empty(drive.size), drive[0]

@@ -49,6 +49,9 @@ SHORT = 32
 """Samples of a short window: the longest between the turns of a fast drive, the shortest in which ringing is a peak."""
 CHANCE = 2.0
 """Relative differences, times √n, up to which the noise of short windows is the same as that of a whole record."""
+SHOWN = 5.0
+"""Relative excess of the scatter over the white noise, times √n, up to which chance explains it (two standard errors).
+"""
 
 
 def stroke(records: Sequence[Record]) -> float:
@@ -179,7 +182,8 @@ def noise_floors(records: Sequence[Record]) -> Array:
     (periodic,) = np.nonzero(np.isfinite(scatter) & (white > 0.0))
     if not periodic.size:
         return white
-    beyond = np.sqrt(np.maximum(scatter**2 - white**2, 0.0))
+    by_chance = (1.0 + SHOWN / np.sqrt([r.size for r in records])) * white
+    beyond = np.sqrt(np.maximum(scatter**2 - by_chance**2, 0.0))  # of a slow record, it counts more in fast ones
     fastest = [i for i in periodic[np.argsort(-speed[periodic])][:FASTEST] if speed[i] > 0.0]
     jitter = min((beyond[i] / speed[i] for i in fastest), default=0.0)
     excess = [np.sqrt(max(1.0, (scatter[i] ** 2 - (jitter * speed[i]) ** 2) / white[i] ** 2)) for i in periodic]
