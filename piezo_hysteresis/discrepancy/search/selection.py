@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 from ...effects import CATALOGUE, Effect
 from ...identification.fit.cross_validation import Score
@@ -29,7 +30,7 @@ from ...identification.fit.normal_equations import residuals
 from ...identification.fit.time_limit import TimeSpentError
 from ...identification.records.noise_floor import ADEQUATE
 from ...model.model import Model
-from .acceptance_tests import bends_all_along, first_rejection
+from .acceptance_tests import bends_all_along, first_rejection, is_certain
 from .candidate_refits import (
     CLOSE,
     LEAST_GAIN,
@@ -41,6 +42,7 @@ from .candidate_refits import (
     simplest,
 )
 from .candidates import BY_COST, Candidate, FittedCandidate, screen
+from .refit import LATER, refit, without
 from .selection_result import Rejection, Selection, Step
 from .training_data import TrainingData
 
@@ -82,9 +84,31 @@ def select(
             steps.append(step)
             if not step.accepted:
                 break
-            model, score, training_data = step.best.fit.model, step.best.score, step.best.training_data
+            steps = needed(steps)
+            best = steps[-1].best
+            model, score, training_data = best.fit.model, best.score, best.training_data
         in_time = True
     return Selection(baseline, model, score, tuple(steps), training_data.null, in_time, training_data)
+
+
+def needed(accepted: Sequence[Step]) -> list[Step]:
+    """The steps without those whose effects the newest one makes superfluous."""
+    steps = list(accepted)
+    for step in accepted[:-1]:
+        newest = steps[-1].best
+        earlier = replace(newest, effect=newest.fit.model[step.best.name])
+        alone = without(earlier)
+        if alone is None or alone.score.cost - newest.score.cost >= LEAST_GAIN or is_certain(earlier):
+            continue
+        best = refit(alone.model.without(newest.name), replace(newest, effect=alone.model[newest.name]), LATER)
+        if best is None:
+            continue
+        place = steps.index(step)
+        steps[place + 1] = replace(steps[place + 1], before=step.before)
+        del steps[place]
+        rejected = Rejection(earlier.name, f"beside {best.name}, its interval does not exclude that it is absent")
+        steps[-1] = replace(steps[-1], best=best, rejected=(*steps[-1].rejected, rejected))
+    return steps
 
 
 def _turn(
