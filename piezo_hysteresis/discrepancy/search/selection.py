@@ -75,10 +75,11 @@ def select(
         Called with a message and the fraction done.
     """
     report = progress or (lambda word, fraction: None)
-    baseline, steps, in_time = model, list[Step](), False
+    steps, in_time = list[Step](), False
+    now, reached, data = model, score, training_data
     with suppress(TimeSpentError):
-        while leaves_room(score) and len(steps) < MOST:
-            step = _turn(model, training_data, score, effects, report)
+        while leaves_room(reached) and len(steps) < MOST:
+            step = _turn(now, data, reached, effects, report)
             if step is None:
                 break
             steps.append(step)
@@ -86,9 +87,26 @@ def select(
                 break
             steps = needed(steps)
             best = steps[-1].best
-            model, score, training_data = best.fit.model, best.score, best.training_data
+            now, reached, data = best.fit.model, best.score, best.training_data
+        steps = certain(steps)
         in_time = True
-    return Selection(baseline, model, score, tuple(steps), training_data.null, in_time, training_data)
+    accepted = [step.best for step in steps if step.accepted]
+    if accepted:
+        return Selection(model, accepted[-1].fit.model, accepted[-1].score, tuple(steps), data.null, in_time, data)
+    return Selection(model, model, score, tuple(steps), data.null, in_time, data)
+
+
+def certain(steps: Sequence[Step]) -> list[Step]:
+    """The steps without the last effects as long as their intervals do not exclude that they are absent.
+
+    Only the last model shows this: while an effect is missing, the misfit makes the intervals of others wide.
+    """
+    kept = list(steps)
+    while (accepted := [step for step in kept if step.accepted]) and not is_certain(accepted[-1].best):
+        last = accepted[-1]
+        rejected = Rejection(last.best.name, "its interval does not exclude that it is absent")
+        kept = [*accepted[:-1], replace(last, accepted=False, rivals=(), rejected=(rejected, *last.rejected))]
+    return kept
 
 
 def needed(accepted: Sequence[Step]) -> list[Step]:
