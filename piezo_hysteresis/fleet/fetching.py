@@ -18,11 +18,13 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+import stat
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from ..errors import RecordingError
 from .source import Source
 
 BLOCK = 1 << 20
@@ -51,7 +53,8 @@ def fetch(source: Source, stack: ExitStack) -> Path:
     if "://" not in source.url:
         path = Path(source.folder or source.files[0])
         for file in source.files:
-            Path(file).stat()
+            if not stat.S_ISREG(Path(file).stat().st_mode):
+                raise RecordingError(f"{file} is no regular file, expected one")
         return path
     fs, _ = source.storage.open(source.url)
     copy = Path(stack.enter_context(TemporaryDirectory(prefix="piezo_fleet_")))

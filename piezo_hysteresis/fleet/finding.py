@@ -17,9 +17,10 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
+from collections import defaultdict, deque
 from collections.abc import Iterator, Sequence
-from itertools import groupby
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -34,7 +35,7 @@ ENDINGS = frozenset(
 _BAG = frozenset((".mcap", ".db3", ".zstd"))
 """Endings of the files of a bag."""
 _PHASE = re.compile(r"\d{1,3}[_ -][A-Za-z]\w*\.npz")
-"""Name of one phase of an experiment that is a folder of NPZ files."""
+"""Name of a phase by which a folder of NPZ files is one experiment."""
 _MAGIC = re.compile(r"[*?\[]")
 """Characters that make a path a pattern."""
 
@@ -93,29 +94,67 @@ def _named_by(url: str, storage: Storage, names: NamePattern) -> Iterator[Source
         matches = {path: info}
     files: dict[str, Info] = {}
     for name, info in matches.items():
-        files |= fs.find(name, detail=True) if info["type"] == "directory" else {name: info}
-    for folder, group in groupby(sorted(files.items()), key=lambda item: item[0].rpartition("/")[0]):
-        yield from _in_folder(fs, folder, [{**info, "name": name} for name, info in group], storage, names)
+        files |= _files_in(fs, name) if info["type"] == "directory" or _is_folder(fs, name) else {name: info}
+    folders: dict[str, list[Info]] = defaultdict(list)
+    for name, info in sorted(files.items()):
+        folders[name.rpartition("/")[0]].append({**info, "name": name})
+    for folder, infos in folders.items():
+        yield from _in_folder(fs, folder, infos, storage, names)
+
+
+def _is_local(fs: Any) -> bool:
+    return "file" in ((fs.protocol,) if isinstance(fs.protocol, str) else fs.protocol)
+
+
+def _is_folder(fs: Any, name: str) -> bool:
+    """Whether a name on a disk is a link to a folder; fsspec calls it neither file nor folder."""
+    return _is_local(fs) and os.path.isdir(name)
+
+
+def _files_in(fs: Any, place: str) -> dict[str, Info]:
+    """All files in a folder, at any depth.
+
+    On a disk, links to folders are followed, each folder is read once, and the times are those of the linked files.
+    """
+    if not _is_local(fs):
+        return dict(fs.find(place, detail=True))
+    files: dict[str, Info] = {}
+    waiting, seen = deque([place]), set()
+    while waiting:
+        for folder, inner, names in os.walk(waiting.popleft()):
+            real = os.path.realpath(folder)
+            if real in seen:
+                inner.clear()
+                continue
+            seen.add(real)
+            waiting += [path for name in inner if os.path.islink(path := os.path.join(folder, name))]
+            for path in (os.path.join(folder, name) for name in names):
+                if os.path.isfile(path):
+                    files[path] = fs.info(path)
+                elif os.path.islink(path):  # it may be reachable in the next run
+                    files[path] = {"size": 0}
+    return files
 
 
 def _in_folder(fs: Any, folder: str, infos: list[Info], storage: Storage, names: NamePattern) -> Iterator[Source]:
+    """The recordings in one folder: what `recording.read` reads as one, and every other file."""
     paths = {info["name"]: PurePosixPath(info["name"]) for info in infos}
-    if any(path.name == "metadata.yaml" for path in paths.values()):
-        bag = [i for i in infos if paths[i["name"]].suffix in _BAG or paths[i["name"]].suffix == ".yaml"]
-        yield _source(fs, bag, folder, storage, names)
-        return
-    phases = [info for info in infos if _PHASE.fullmatch(paths[info["name"]].name)]
-    if phases:
-        yield _source(fs, phases, folder, storage, names)
+    whole: list[Info] = []
+    bag = [i for i in infos if paths[i["name"]].suffix in _BAG]
+    if bag and any(path.name == "metadata.yaml" for path in paths.values()):
+        whole = bag + [i for i in infos if paths[i["name"]].suffix == ".yaml"]
+    elif any(_PHASE.fullmatch(path.name) for path in paths.values()):
+        whole = [i for i in infos if paths[i["name"]].suffix == ".npz"]
+    if whole:
+        yield _source(fs, whole, folder, storage, names)
     for info in infos:
-        if info not in phases and paths[info["name"]].suffix.lower() in ENDINGS:
+        if info not in whole and paths[info["name"]].suffix.lower() in ENDINGS:
             yield _source(fs, [info], "", storage, names)
 
 
 def _source(fs: Any, infos: list[Info], folder: str, storage: Storage, names: NamePattern) -> Source:
     path = folder or infos[0]["name"]
-    local = "file" in ((fs.protocol,) if isinstance(fs.protocol, str) else fs.protocol)
-    url = path if local or "://" in path else f"s3://{path}"
+    url = path if _is_local(fs) or "://" in path else f"s3://{path}"
     version = version_of(infos)
     if len(infos) > 1 and version:
         listed = "\n".join(f"{info['name']} {version_of([info])}" for info in infos)

@@ -55,7 +55,7 @@ class Storage:
             bucket = url.removeprefix("s3://").partition("/")[0]
             return _s3(bucket, self.endpoint, self.anonymous), url[5:].rstrip("/")
         if not scheme:
-            return _disk(), str(in_home(url).absolute())
+            return _disk(), os.path.abspath(in_home(url))
         fsspec = package("fsspec")
         try:
             fs, path = fsspec.core.url_to_fs(url)

@@ -17,15 +17,21 @@
 from __future__ import annotations
 
 import os
+from contextlib import ExitStack
+from dataclasses import replace
 from datetime import UTC, datetime
 
+import numpy as np
 import pytest
 
 pytest.importorskip("fsspec")
 
+from piezo_hysteresis import recording
 from piezo_hysteresis.errors import ParameterError, RecordingError
+from piezo_hysteresis.fleet.fetching import fetch
 from piezo_hysteresis.fleet.finding import find_recordings
 from piezo_hysteresis.fleet.source import NamePattern
+from piezo_hysteresis.record import Experiment, Record
 
 
 @pytest.fixture
@@ -72,6 +78,54 @@ def test_the_version_changes_with_the_file(lab):
     (place / "02_triangle.npz").write_text("longer than it was before")
     (after,) = find_recordings([str(place)])
     assert before.version != after.version
+
+
+def found_in(folder, *urls):
+    """The places of the recordings in a folder, and the numbers of their files."""
+    return {os.path.relpath(s.url, folder): len(s.files) for s in find_recordings(urls or [str(folder)])}
+
+
+def test_a_folder_in_a_bag_leaves_the_bag_whole(tmp_path):
+    for name in ("bag_0.mcap", "bag_1.mcap", "figures/look.csv", "metadata.yaml"):
+        (tmp_path / "bag" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "bag" / name).write_text(name)
+    assert found_in(tmp_path) == {"bag": 3, "bag/figures/look.csv": 1}
+
+
+def test_tables_beside_metadata_that_are_not_of_a_bag_are_recordings(tmp_path):
+    for name in ("a.csv", "b.csv", "metadata.yaml"):
+        (tmp_path / name).write_text(name)
+    assert found_in(tmp_path) == {"a.csv": 1, "b.csv": 1}
+
+
+def test_every_phase_of_an_experiment_belongs_to_it(tmp_path):
+    rest = Record(np.zeros(9), np.zeros(9), 1e-3)
+    phases = ("rest", "sine_0.5hz", "sine-2", "100", "step+rest")
+    recording.write(Experiment(tuple(replace(rest, phase=phase) for phase in phases)), tmp_path / "run")
+    assert found_in(tmp_path) == {"run": len(phases)}
+
+
+def test_links_are_followed_and_every_folder_is_read_once(lab, tmp_path_factory):
+    inbox = tmp_path_factory.mktemp("inbox")
+    os.utime(lab / "stage_b/20261104T1530.csv", (1.7e9, 1.7e9))
+    (inbox / "stage_b").symlink_to(lab / "stage_b")
+    (inbox / "again").symlink_to(inbox)
+    (inbox / "run.csv").symlink_to(lab / "stage_b/20261104T1530.csv")
+    (inbox / "missing.csv").symlink_to("nowhere.csv")
+    os.mkfifo(inbox / "pipe.csv")
+    stage_b = {"stage_b/2026-10-05.NPZ": 1, "stage_b/20261104T1530.csv": 1}
+    assert found_in(inbox) == {"missing.csv": 1, "run.csv": 1} | stage_b
+    assert found_in(inbox, f"{inbox}/stage_*", f"{inbox}/../{inbox.name}/stage_b") == stage_b
+    (run,) = find_recordings([f"{inbox}/run.csv"])
+    assert run in find_recordings([str(inbox)])
+    assert run.recorded_at == datetime.fromtimestamp(1.7e9, UTC)
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    (pipe,) = find_recordings([f"{tmp_path}/pipe.csv"])
+    with pytest.raises(RecordingError, match="is no regular file"), ExitStack() as stack:
+        fetch(pipe, stack)
 
 
 @pytest.mark.parametrize("url", ["missing", "stage_b/*.h5", "stage_b/notes"])
