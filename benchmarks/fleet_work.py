@@ -20,6 +20,7 @@ import os
 import time
 from dataclasses import dataclass
 
+from piezo_hysteresis.fleet import time_limit
 from piezo_hysteresis.fleet.work_result import WorkResult
 from piezo_hysteresis.record import Experiment
 
@@ -27,6 +28,8 @@ from piezo_hysteresis.record import Experiment
 @dataclass(frozen=True, slots=True)
 class Wait:
     """Waits for a fixed time, and ends its process at a recording with a phase ``crash``.
+
+    At a phase ``stuck``, it waits in one call that nothing interrupts, and shortens the grace of its process.
 
     Parameters
     ----------
@@ -45,6 +48,9 @@ class Wait:
         """Wait in short steps, as Python code does."""
         if experiment.named("crash"):
             os._exit(9)
+        if experiment.named("stuck"):
+            time_limit.GRACE = 0.1
+            time.sleep(self.seconds)
         end = time.monotonic() + self.seconds
         while (left := end - time.monotonic()) > 0.0:
             time.sleep(min(left, 0.05))

@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -28,12 +29,17 @@ from typing import Any
 from .. import recording
 from ..errors import PiezoError, printable, reason_of
 from .code_hash import code_hash
+from .extra import package
 from .fetching import content_hash, fetch
 from .source import Source
 from .time_limit import RecordingTimeSpent, within
 from .work import Work
 
 Row = dict[str, Any]
+LATE = "piezo_fleet_late"
+"""Topic of the events of Dask that hold the tasks whose process the time limit has ended."""
+SENDING = 1.0
+"""Time for which such an event is sent before the process ends [s]."""
 
 
 class RowStatus(StrEnum):
@@ -131,11 +137,11 @@ def attempt(order: Order) -> Row:
     began, spent = time.monotonic(), time.process_time()
     columns: Row = {}
     try:
-        with within(order.limit), ExitStack() as stack:
+        with within(order.limit, _end_of_worker()), ExitStack() as stack:
             status = _process(order, stack, columns)
     except RecordingTimeSpent:
         status = RowStatus.TIMED_OUT
-        columns["error"] = f"no result within the time limit of {order.limit:g} s; increase --time-limit"
+        columns["error"] = _late(order)
     columns |= {"seconds": time.monotonic() - began, "processor_seconds": time.process_time() - spent}
     return order.row(status, worker=f"{socket.gethostname()}", **columns)
 
@@ -166,21 +172,45 @@ def _process(order: Order, stack: ExitStack, columns: Row) -> RowStatus:
     return RowStatus.DONE
 
 
+def _late(order: Order) -> str:
+    return f"no result within the time limit of {order.limit:g} s; increase --time-limit"
+
+
+def _end_of_worker() -> Callable[[], None] | None:
+    """A function that ends this worker, and first says in the events `LATE` for which task; None outside of Dask."""
+    try:
+        worker = package("distributed").get_worker()
+    except ValueError:
+        return None
+    key = str(worker.get_current_task())
+
+    def end() -> None:
+        worker.log_event(LATE, key)
+        time.sleep(SENDING)
+        os._exit(1)
+
+    return end
+
+
 def _line(error: BaseException) -> str:
     return printable(" ".join(str(error).split()))
 
 
-def lost(order: Order) -> Row:
-    """The row of a recording for which the worker process ended in every attempt.
+def lost(order: Order, is_late: bool) -> Row:
+    """The row of a recording without a result because worker processes ended.
 
     Parameters
     ----------
     order : Order
+    is_late : bool
+        Whether the time limit ended the process; otherwise each attempt ended for another reason.
 
     Returns
     -------
     dict
         The row: values by column.
     """
+    if is_late:
+        return order.row(RowStatus.TIMED_OUT, error=f"{_late(order)}; a library did not return, its process was ended")
     reason = "the worker process ended in every attempt: too little memory, or a crash in a library"
     return order.row(RowStatus.KILLED, error=reason)

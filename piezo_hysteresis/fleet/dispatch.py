@@ -24,7 +24,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ..errors import PiezoError, RecordingError, printable
-from .attempt import Order, Row, attempt, lost
+from .attempt import LATE, Order, Row, attempt, lost
 from .cluster import revive
 
 AHEAD = 4
@@ -94,7 +94,7 @@ class Dispatch:
             if row is not None:
                 rows.append(row)
             elif future.status == "error":
-                rows += self._failed(number, future.exception())
+                rows += self._failed(number, future)
             else:
                 self._watch(future, number)
         return rows
@@ -136,15 +136,17 @@ class Dispatch:
         self._running[future] = number
         future.add_done_callback(self._ended.put)
 
-    def _failed(self, number: int, error: BaseException) -> list[Row]:
+    def _failed(self, number: int, future: Any) -> list[Row]:
+        error = future.exception()
         if isinstance(error, PiezoError):
             raise error
         if type(error).__name__ != "KilledWorker":
             reason = printable(" ".join(str(error).split())) or type(error).__name__
             raise RecordingError(f"{self._orders[number].source.url}: {reason}; see the log of the workers")
+        is_late = any(key == str(future.key) for _, key in self._client.get_events(LATE))
         self._deaths[number] += 1
-        if self._deaths[number] >= TOGETHER + ALONE:
-            return [lost(self._orders[number])]
+        if is_late or self._deaths[number] >= TOGETHER + ALONE:
+            return [lost(self._orders[number], is_late)]
         (self._waiting if self._deaths[number] < TOGETHER else self._suspects).append(number)
         return []
 

@@ -185,6 +185,13 @@ def test_a_recording_that_ends_its_process_costs_one_row(recordings, run, rows):
     assert "ended in every attempt" in lost["error"]
 
 
+def test_a_process_that_the_time_limit_ends_is_not_tried_again(recordings, run, rows):
+    recording.write(play(5, "stuck"), recordings / "stage_b" / "2026-12-01")
+    assert run(recordings / "stage_b", Wait(20.0), limit=3.0) == {"timed_out": 3}
+    assert all("the time limit of 3 s" in row["error"] for row in rows())
+    assert [row["recording"][-5:] for row in rows() if "its process was ended" in row["error"]] == ["12-01"]
+
+
 def test_no_row_is_lost_or_doubled_when_workers_are_killed(tmp_path, client):
     file = tmp_path / "template.npz"
     recording.write(play(1), tmp_path / "one")
