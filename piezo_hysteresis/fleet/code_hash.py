@@ -22,8 +22,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 ROOMS = (
-    "blocks", "channel_mapping.py", "discrepancy", "effects", "fleet/work.py", "fleet/work_result.py", "identification",
-    "model", "notice.py", "online", "parameter.py", "record.py", "recording", "report/words.py",
+    "blocks", "changes", "channel_mapping.py", "discrepancy", "effects", "errors.py", "fleet/work.py",
+    "fleet/work_result.py", "gcs_header.py", "identification", "inverse_terms.py", "model", "notice.py", "online",
+    "parameter.py", "point_cloud.py", "record.py", "recording", "report/words.py", "turning_points.py", "yaml_file.py",
 )  # fmt: skip
 """Modules on which a result depends."""
 LIBRARIES = ("numba", "numpy", "scipy")
