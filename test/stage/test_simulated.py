@@ -15,6 +15,7 @@
 """Both kinds of simulated stage keep the promises of the stage protocol."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -57,13 +58,27 @@ def test_streaming_is_the_plant_sample_by_sample():
     assert stage.time == pytest.approx(900 * TS)
 
 
+@pytest.mark.parametrize("steps", [1, 2, 7])
+def test_the_slew_counts_from_the_command_and_not_from_the_converter(steps):
+    """The converter rounds each voltage; the last one of a block made the next block too steep by half of a step."""
+    stage = SimulatedStage()
+    limits = replace(stage.description, max_slew_rate=2000.0)
+    stage.restrict(limits, 50.0)
+    drive = 2000.0 * TS * np.arange(1.0, 100.0)
+    got = [stage.exchange(block) for block in np.split(drive, np.arange(steps, drive.size, steps))]
+    assert np.max(np.abs(np.concatenate([g.voltage for g in got]) - drive)) < 2e-4
+    with pytest.raises(StageError, match="steps by"):
+        stage.exchange(drive[-1:] + 0.0401)
+
+
 def test_memory_plays_the_uploaded_waveform_after_a_dead_time():
     stage, drive = SimulatedMemoryStage(seed=3, dead_time=0.01), 5 + np.sin(0.01 * np.arange(900))
     got = play_from_memory(stage, drive)
     lived = np.r_[np.zeros(500), drive]
     expected = Plant(PlantParameters(), TS, seed=3).run(lived)
     np.testing.assert_array_equal(got.displacement, expected.displacement[500:])
-    assert stage.voltage == got.voltage[-1]
+    assert stage.voltage == drive[-1]
+    assert stage.read_voltage() == got.voltage[-1]
     again = play_from_memory(stage, drive)
     assert again.displacement[0] == pytest.approx(got.displacement[-1], abs=0.3e-6)
     assert stage.time == pytest.approx(0.01 + 0.018 + 0.01 + 0.018)

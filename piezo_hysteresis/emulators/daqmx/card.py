@@ -98,7 +98,7 @@ class Card:
     @property
     def voltage(self) -> float:
         """Voltage at the output [V]."""
-        return self._stage.voltage
+        return self._stage.read_voltage()
 
     @property
     def available(self) -> int:

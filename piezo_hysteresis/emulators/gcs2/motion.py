@@ -73,7 +73,7 @@ class Motion:
     @property
     def voltage(self) -> float:
         """Piezo voltage [V]."""
-        return self.stage.voltage * self.stage.description.amplifier_gain
+        return self.stage.read_voltage() * self.stage.description.amplifier_gain
 
     @property
     def position(self) -> float:

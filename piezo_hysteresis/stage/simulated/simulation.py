@@ -66,6 +66,7 @@ class Simulation:
         self._sample_period = self._description.check_sample_period(sample_period)
         Plant(self.parameters, self._sample_period).run(np.zeros(1))  # compiles the kernels before a clock runs
         self._plant = Plant(self.parameters, self._sample_period, seed, rest)
+        self._voltage = rest
         self._closed = False
 
     @classmethod
@@ -88,8 +89,8 @@ class Simulation:
 
     @property
     def voltage(self) -> float:
-        """Present drive voltage [V]."""
-        return self._plant.voltage
+        """Present drive voltage [V], as it was commanded; `read_voltage` gives that of the converter."""
+        return self._voltage
 
     @property
     def time(self) -> float:
@@ -116,7 +117,7 @@ class Simulation:
     def read_voltage(self) -> float:
         """The drive voltage that the converter applies [V]."""
         self._require_ready()
-        return self.voltage
+        return self._plant.voltage
 
     def read_displacement(self) -> float:
         """One reading [m] while the voltage is held; takes one sample period of simulated time."""
@@ -177,8 +178,8 @@ class Simulation:
         drive = self._check(voltage, start)
         if not continues:
             self._plant.settle(self._check([start], start)[0])
-        settled, time_before = self.voltage, self.time
-        reading = self._plant.run(drive)
+        settled, time_before = self._plant.voltage, self.time
+        reading = self._apply(drive)
         record = Record(
             reading.voltage,
             reading.displacement,
@@ -200,8 +201,12 @@ class Simulation:
 
     def _go(self, voltage: float) -> None:
         for part in self._limiter.ramp(self.voltage, voltage, self._sample_period):
-            self._plant.run(part)
+            self._apply(part)
 
     def _run(self, voltage: Samples) -> Reading:
         self._require_ready()
-        return self._plant.run(self._check(voltage, self.voltage))
+        return self._apply(self._check(voltage, self.voltage))
+
+    def _apply(self, drive: Samples) -> Reading:
+        self._voltage = float(drive[-1])
+        return self._plant.run(drive)

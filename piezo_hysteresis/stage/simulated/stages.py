@@ -120,7 +120,7 @@ class SimulatedMemoryStage(Simulation):
         self._check(self._uploaded(), self.voltage)
         idle = round(self._dead_time / self._sample_period)
         if idle:
-            self._plant.run(np.full(idle, self.voltage))
+            self._apply(np.full(idle, self.voltage))
         self._acquired, self._armed = None, True
 
     def start(self) -> None:
@@ -164,7 +164,7 @@ class SimulatedMemoryStage(Simulation):
             share = 1 - self._left() * self._factor / (waveform.size * self._sample_period) if self._left() else 1.0
             played = waveform[: int(share * waveform.size)]
             if played.size:
-                self._plant.run(played)
+                self._apply(played)
             self._playing = False
         super().safe()
 
@@ -188,4 +188,4 @@ class SimulatedMemoryStage(Simulation):
             return
         if self._left() > 0.0:
             raise StageError(f"{self._description.name}: is still playing, expected wait() first")
-        self._acquired, self._playing = Acquired(*self._plant.run(self._uploaded())), False
+        self._acquired, self._playing = Acquired(*self._apply(self._uploaded())), False
