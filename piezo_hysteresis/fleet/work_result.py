@@ -23,6 +23,7 @@ from typing import Any
 
 from ..effects import Arx, ChainPosition
 from ..identification.fit.fit import Fit
+from ..identification.structure.mode import assumed_numbers
 from ..record import Notice
 
 
@@ -83,6 +84,8 @@ class WorkResult:
 def fitted_parameters(fit: Fit | None) -> tuple[Mapping[str, Any], ...]:
     """The fitted parameters in SI units, with their 95 % intervals, limited to their bounds.
 
+    Like in `piezo identify --json`, values at a bound and those that were assumed have no interval.
+
     Every recording has scales and a sample period of its own, so the dimensionless numbers and the delays in samples of
     two recordings cannot be compared.
 
@@ -96,16 +99,17 @@ def fitted_parameters(fit: Fit | None) -> tuple[Mapping[str, Any], ...]:
 
 def _parameters(fit: Fit) -> Iterable[Mapping[str, Any]]:
     model = fit.model
+    unsure = {*fit.at_bounds, *assumed_numbers(model)}
     for name, value in fit.values.items():
         row = model.row(name)
-        lower, upper = fit.interval(name)
+        lower, upper = fit.interval(name) if name not in unsure else (math.nan, math.nan)
         volts, metres = row.powers
         before_dynamics = model[name.partition(".")[0]].place is ChainPosition.HYSTERESIS
         output = model.displacement_scale * (model.effect(Arx).dc_gain if before_dynamics else 1.0)
         factor, unit = model.voltage_scale**volts * output**metres, row.physical_unit
         if unit == "samples":
             factor, unit = model.sample_period, "s"
-        low, high = sorted((factor * max(lower, row.lower), factor * min(upper, row.upper)))
+        low, high = sorted(factor * min(max(end, row.lower), row.upper) for end in (lower, upper))
         yield {
             "name": name,
             "value": _finite(factor * value),

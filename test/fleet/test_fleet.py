@@ -31,6 +31,7 @@ pytest.importorskip("pyarrow")
 
 from benchmarks.fleet_work import Wait
 from piezo_hysteresis import recording
+from piezo_hysteresis.cli.model.identify import answer
 from piezo_hysteresis.fleet import code_hash, fleet
 from piezo_hysteresis.fleet.attempt import OtherCodeError
 from piezo_hysteresis.fleet.cluster import cluster
@@ -38,6 +39,7 @@ from piezo_hysteresis.fleet.finding import find_recordings
 from piezo_hysteresis.fleet.fleet import open_orders, run_fleet
 from piezo_hysteresis.fleet.table.results import Results, read_results
 from piezo_hysteresis.fleet.work import Identify, Validate
+from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.record import Experiment
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
@@ -90,6 +92,19 @@ def test_identified_parameters_have_intervals_and_the_model_loads(recordings, ru
             scale = model.voltage_scale**volts * model.displacement_scale**metres
             scale *= model.sample_period if parameter["name"] == "arx.delay" else 1.0
             assert parameter["value"] == pytest.approx(scale * model.values()[parameter["name"]])
+
+
+def test_a_value_at_a_bound_has_no_interval_as_in_piezo_identify():
+    stage = SimulatedStage.from_mapping({"hysteresis.operator": "prandtl_ishlinskii"}, seed=1, sample_period=1e-3)
+    time = 1e-3 * np.arange(4000)
+    triangle = (1.0 - np.abs(2.0 * (time % 1.0) - 1.0)) * np.repeat([9.0, 6.0], 2000)
+    experiment = Experiment((stage.play(triangle, "triangle"),))
+    found = identify(experiment, memory=True)
+    assert found.fit.at_bounds
+    stated = answer(found, "model.yaml")["parameters"]
+    for parameter in Identify()(experiment).parameters:
+        without = stated[parameter["name"]]["interval_95"] is None
+        assert (parameter["lower"] is None, parameter["upper"] is None) == (without, without)
 
 
 def test_parameters_of_one_stage_do_not_depend_on_the_amplitude_of_its_recordings():

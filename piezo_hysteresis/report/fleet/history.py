@@ -48,8 +48,11 @@ class ParameterSeries:
 
     @property
     def standard_error(self) -> Array:
-        """Standard errors of the estimates (k,), from their intervals; NaN without an interval."""
-        return (self.upper - self.lower) / (2 * 1.96)
+        """Standard errors of the estimates (k,), NaN without an interval.
+
+        They come from the longer side of the interval, because a bound of the parameter may cut the other one.
+        """
+        return np.maximum(self.upper - self.value, self.value - self.lower) / 1.96
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -67,14 +67,13 @@ def outlying_stages(history: FleetHistory) -> tuple[OutlyingStage, ...]:
 
 
 def _outlying(history: FleetHistory, name: str, series: ParameterSeries) -> list[OutlyingStage]:
-    owner = history.stage[series.index]
+    errors = series.standard_error
+    known = np.isfinite(errors)  # a value at a bound, or an assumed one, is no estimate
+    owner, value, errors = history.stage[series.index][known], series.value[known], errors[known]
     stages = np.unique(owner)
     if stages.size < FEWEST:
         return []
-    medians = np.array([np.median(series.value[owner == stage]) for stage in stages])
-    errors = series.standard_error
-    known = np.isfinite(errors)
-    sure = np.array([np.median(errors[(owner == s) & known]) if np.any((owner == s) & known) else 0.0 for s in stages])
+    medians, sure = (np.array([np.median(x[owner == stage]) for stage in stages]) for x in (value, errors))
     typical = float(np.median(medians))
     scale = np.hypot(MAD * np.median(np.abs(medians - typical)), sure)
     distance = np.divide(np.abs(medians - typical), scale, out=np.zeros_like(scale), where=scale > 0.0)

@@ -87,11 +87,33 @@ def test_a_stage_that_changes_is_named_with_its_change():
     h = history()
     assert changed_stages(h) == ()
     late = (h.stage == "s2") & (h.time > np.datetime64("2026-03-10"))
-    h.parameters["bouc_wen.A"].value[late] += 0.05
+    series = h.parameters["bouc_wen.A"]
+    for part in (series.value, series.lower, series.upper):
+        part[late] += 0.05
     (found,) = changed_stages(h)
     assert (found.stage, found.parameter) == ("s2", "bouc_wen.A")
     assert found.later - found.earlier == pytest.approx(0.05, abs=0.01)
     assert "One stage has changed over time: s2, the first in bouc_wen.A." in fleet_page(h).html
+
+
+def test_an_interval_that_a_bound_cuts_is_no_reason_for_a_change():
+    """Two delays of 0 to 1 ms, both known within 1.1 ms: they differ by less than 1.3 standard errors of 0.56 ms."""
+    value = np.where(np.arange(EACH * len(STAGES)) % EACH < EACH // 2, 0.1e-3, 1.1e-3)
+    h = history()
+    index = h.parameters["bouc_wen.A"].index
+    lower, upper = np.maximum(value - 1.1e-3, 0.0), value + 1.1e-3
+    object.__setattr__(h, "parameters", {"arx.delay": ParameterSeries("s", index, value, lower, upper)})
+    assert h.parameters["arx.delay"].standard_error == pytest.approx(1.1e-3 / 1.96)
+    assert changed_stages(h) == ()
+
+
+def test_a_value_without_an_interval_is_no_reason_for_an_outlying_stage():
+    """At a bound, or assumed: it is no estimate."""
+    h = history(shift=0.3)
+    series = h.parameters["bouc_wen.A"]
+    at_bound = h.stage[series.index] == "s7"
+    series.lower[at_bound] = series.upper[at_bound] = np.nan
+    assert outlying_stages(h) == ()
 
 
 def test_the_sentences_of_the_page_agree_with_the_numbers(tmp_path):
