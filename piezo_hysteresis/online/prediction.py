@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.model import Model
+from .sensor_offset import SensorOffset
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,8 @@ class Prediction:
         Model that computed them.
     warming_up : bool
         True while voltages that were not received (before the first block, in a gap) influence the prediction.
+    zeroing : (SensorOffset, int)
+        Measurement of the sensor offset, and its samples so far; the offset is the same while it is.
     """
 
     first: int
@@ -47,3 +50,4 @@ class Prediction:
     residual: Array
     model: Model | None
     warming_up: bool
+    zeroing: tuple[SensorOffset, int]

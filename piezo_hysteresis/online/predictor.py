@@ -196,7 +196,7 @@ class Predictor:
         prediction = np.empty(0) if modelled is None else modelled + self.offset
         residual = measured[: prediction.size] - prediction
         self._rms.add(residual)
-        answer = Prediction(arrival.repeated, prediction, residual, self.model, self.warming_up)
+        answer = Prediction(arrival.repeated, prediction, residual, self.model, self.warming_up, self._zero.so_far)
         self._advance_swap(drive.size)
         return answer
 

@@ -65,6 +65,11 @@ class SensorOffset:
         """Sensor minus model [m]; before the first sample it is the known offset, or 0."""
         return (self._measured - self._modelled) / (self.stop - self.start) if self.stop > self.start else self._known
 
+    @property
+    def so_far(self) -> tuple[SensorOffset, int]:
+        """The measurement itself, and the end of its samples so far."""
+        return self, self.stop
+
     def add(self, measured: Array, modelled: Array | None, travel: float) -> None:
         """Add the next samples that lie in the window.
 

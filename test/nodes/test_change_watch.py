@@ -110,6 +110,8 @@ def test_a_stage_that_changes_is_reported_with_its_group(lab, tmp_path):
         "a watch that does not speak about a drive that it does not know",
     )
     assert reported[-1].level == DiagnosticStatus.STALE
+    lab.wait(lambda: "no prediction" in reported[-1].message, "a watch that says nothing about a silent stage")
+    assert reported[-1].level == DiagnosticStatus.STALE
 
 
 def test_a_node_without_a_model_takes_no_baseline(lab):

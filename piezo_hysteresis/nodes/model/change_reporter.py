@@ -71,7 +71,7 @@ STRONG = 4.0
 
 
 _LONGEST_SILENCE = 3.0
-"""Time without a prediction after which no baseline is begun [s]."""
+"""Time without a prediction after which the watch is silent, and no baseline is begun [s]."""
 
 
 class ChangeReporter:
@@ -137,10 +137,6 @@ class ChangeReporter:
         self._recalibration = message
         self._publish()
 
-    def restart(self) -> None:
-        """Estimate the offset of the sensor again."""
-        self.watch.restart()
-
     def _follow(self, model: Model) -> None:
         self._model, self._problem = model, ""
         if self._adopted is not None and self._adopted[0] is model:
@@ -172,7 +168,7 @@ class ChangeReporter:
         self._node.get_logger().warning(problem, throttle_duration_sec=1.0)
 
     def _on_baseline(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = time.monotonic() - self._predicted < _LONGEST_SILENCE
+        response.success = self._is_predicting
         if response.success:
             self.watch.take_baseline(self._duration)
             response.message = (
@@ -182,16 +178,22 @@ class ChangeReporter:
             response.message = "no prediction: start the driver and give a model first"
         return response
 
+    @property
+    def _is_predicting(self) -> bool:
+        return time.monotonic() - self._predicted < _LONGEST_SILENCE
+
     def _publish(self) -> None:
         watch, change = self.watch, self.watch.change
         values: dict[str, object] = {"alarms": watch.alarms, "statistic": change.statistic}
         level, message = DiagnosticStatus.STALE, "no baseline; call ~/baseline while the stage is known to be good"
         if self._problem:
             level, message = DiagnosticStatus.WARN, self._problem
+        elif not self._is_predicting and (watch.is_taking or watch.baseline is not None):
+            message = "no prediction; are driver and model there?"
         elif watch.is_taking:
             message = "taking the baseline"
-        elif watch.baseline is not None and not change.watched:
-            message = "the present drive was not part of the baseline"
+        elif watch.baseline is not None and watch.blind:
+            message = watch.blind
         elif watch.baseline is not None and not watch.since:
             level, message = DiagnosticStatus.OK, "no change since the baseline"
         elif watch.since:

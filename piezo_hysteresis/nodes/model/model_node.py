@@ -171,7 +171,6 @@ class ModelNode(GuardedNode):
             response.message = "no samples have arrived yet, so that the offset cannot be taken"
         else:
             self._predictor.zero()
-            self._changes.restart()
             response.message = "the offset is the mean residual of the next 0.1 s of samples"
         return response
 

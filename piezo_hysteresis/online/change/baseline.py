@@ -32,7 +32,7 @@ from .score import GROUPS, ChangeScore
 
 Array = NDArray[np.float64]
 
-FORMAT = 2
+FORMAT = 3
 """Version of the file format. Only files of this version are read."""
 
 FEWEST_SCORES = 60
@@ -62,13 +62,16 @@ class Baseline:
         Scatter by the value of `drive_class`.
     model : str
         Hash of the model that was running.
+    sample_period : float
+        Of the stream [s]. At another one, the same noise gives scores of another size.
     """
 
     scatter: Mapping[DriveClass, Scatter]
     model: str = ""
+    sample_period: float = 0.0
 
     @classmethod
-    def of(cls, scores: Sequence[ChangeScore], model: str = "") -> Baseline:
+    def of(cls, scores: Sequence[ChangeScore], model: str = "", sample_period: float = 0.0) -> Baseline:
         """Baseline of a series of scores; classes with too few of them are left out.
 
         Raises
@@ -87,15 +90,16 @@ class Baseline:
                 f"baseline: got {len(most)} blocks{each} under one kind of drive, expected at least {FEWEST_SCORES}; "
                 "drive the stage as in normal use for longer"
             )
-        return cls(known, model)
+        return cls(known, model, sample_period)
 
     def of_model(self, model: str) -> Baseline:
         """The same scatter with the hash of another model, which may differ only in a few recalibrated parameters."""
-        return Baseline(self.scatter, model)
+        return Baseline(self.scatter, model, self.sample_period)
 
     def save(self, path: Path) -> None:
         """Write the baseline as .npz; the file appears only when it is complete."""
-        arrays: dict[str, Any] = {"format": np.array(FORMAT), "model": np.array(self.model)}
+        own = {"format": FORMAT, "model": self.model, "sample_period": self.sample_period}
+        arrays: dict[str, Any] = {name: np.array(value) for name, value in own.items()}
         for (span, speed), s in self.scatter.items():
             key = f"{span},{speed}"
             arrays |= {
@@ -132,7 +136,7 @@ class Baseline:
                 if "format" not in file or int(file["format"]) != FORMAT:
                     raise ValueError("another version wrote it, with another file format")
                 for name in file.files:
-                    if name in ("format", "model"):
+                    if name in ("format", "model", "sample_period"):
                         continue
                     span, speed, field = name.split(",")
                     values = np.asarray(file[name], np.float64)
@@ -151,6 +155,6 @@ class Baseline:
                     )
                     for k, s in held.items()
                 }
-                return cls(scatter, str(file["model"]))
+                return cls(scatter, str(file["model"]), float(file["sample_period"]))
         except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
             raise ModelError(f"{path}: got no baseline of the change watch ({error}); take a new one") from None

@@ -27,12 +27,19 @@ from ...model.model import Model
 from ...model.model_parameters import model_hash
 from ..prediction import Prediction
 from ..predictor import Predictor
+from ..sensor_offset import SensorOffset
 from .baseline import Baseline
 from .detector import Change, ChangeDetector
 from .false_alarm_threshold import CLEARED
 from .score import ChangeScore, Scores, loop_heights
 
 Array = NDArray[np.float64]
+
+_SAME_PERIOD = 0.01
+"""Largest relative difference between the sample period of a stream and that of its baseline."""
+
+_ZERO, _OTHER_DRIVE = "the zero of the sensor is being measured", "the present drive was not part of the baseline"
+"""Reasons for `ChangeWatch.blind`."""
 
 
 class ChangeWatch:
@@ -55,6 +62,8 @@ class ChangeWatch:
         Groups of parameters that explained the present or the last change best, over the longest time.
     alarms : int
         Number of changes detected so far.
+    blind : str
+        Why the newest samples are not compared with the baseline; empty while they are.
 
     Raises
     ------
@@ -65,7 +74,8 @@ class ChangeWatch:
 
     Notes
     -----
-    After a change of model or a gap, all scores are discarded and the baseline is kept.
+    After a change of model, a gap, or a new measurement of the sensor offset, all scores are discarded and the baseline
+    is kept.
     """
 
     def __init__(self, false_alarm_interval: float, baseline: Baseline | None = None) -> None:
@@ -76,8 +86,10 @@ class ChangeWatch:
         self.change, self.since, self.alarms = Change(), 0, 0
         self.groups: tuple[str, ...] = ()
         self._best = (0, 0.0)
+        self.blind = _ZERO
         self._model: Model | None = None
-        self._hash = ""
+        self._hash, self._period = "", 0.0
+        self._zeroing: tuple[SensorOffset, int] | None = None
         self._scores: Scores | None = None
         self._detector: ChangeDetector | None = None
         self._wanted = 0.0
@@ -100,10 +112,6 @@ class ChangeWatch:
             raise ParameterError(f"baseline: got a duration of {duration:g} s, expected a finite time above 0 s")
         self._wanted, self._taken = duration, []
 
-    def restart(self) -> None:
-        """Discard all scores, because the sensor offset was measured again or samples were lost."""
-        self._scores = None
-
     def add(self, voltage: Array, answer: Prediction, predictor: Predictor, stamp: int) -> Baseline | None:
         """Compare one block of the stream with the baseline, or add it to the baseline that is being taken.
 
@@ -123,9 +131,12 @@ class ChangeWatch:
         Baseline or None
             Baseline that this block completed, if any.
         """
+        if answer.zeroing != self._zeroing:  # also in a new stream: the residual has another mean from here on
+            self._zeroing, self._taken, self._scores, self.blind = answer.zeroing, [], None, _ZERO
+            return None
         is_idle = self.baseline is None and not self.is_taking
         if is_idle or answer.model is None or answer.warming_up or answer.residual.size == 0:
-            self.restart()
+            self._scores, self.blind = None, "voltages that were not received still influence the prediction"
             return None
         if self._scores is None or answer.model is not self._model:
             self._follow(answer.model, predictor, float(voltage[-1]))
@@ -141,15 +152,22 @@ class ChangeWatch:
             return
         if self._model is not None and model is not self._model:
             self.since, self._wanted = 0, 0.0
-        self._model, self._hash = model, model_hash(model)
+        self._model, self._hash, self._period = model, model_hash(model), predictor.sample_period
         loop = loop_heights(model)
         self._scores = Scores(chain, state, loop, chain.rest_tangent(voltage, loop, state.time))
         self._watch(self.baseline, same_offset=False)
 
     def _watch(self, baseline: Baseline | None, *, same_offset: bool) -> None:
-        self.change, self._detector = Change(), None
-        if baseline is not None and baseline.model == self._hash:
+        self.change, self._detector, self.blind = Change(), None, _ZERO
+        if baseline is None or baseline.model != self._hash:
+            return
+        if math.isclose(baseline.sample_period, self._period, rel_tol=_SAME_PERIOD):
             self._detector = ChangeDetector(baseline, self._interval, same_offset=same_offset)
+        else:
+            self.blind = (
+                f"the baseline was taken at {baseline.sample_period:g} s per sample, and the stream has "
+                f"{self._period:g} s; call ~/baseline while the stage is known to be good"
+            )
 
     def _score(self, score: ChangeScore) -> Baseline | None:
         if self._wanted:
@@ -157,16 +175,18 @@ class ChangeWatch:
             if len(self._taken) < round(self._wanted / score.duration):
                 return None
             taken, self._wanted, self._taken = self._taken, 0.0, []
-            self.baseline = Baseline.of(taken, self._hash)
+            self.baseline = Baseline.of(taken, self._hash, self._period)
             self.since = 0
             self._watch(self.baseline, same_offset=True)
             return self.baseline
         if self._detector is not None:
             self.change = self._detector.add(score)
+            is_compared = bool(self.change.groups)
+            self.blind = "" if is_compared else _ZERO if self.change.watched else _OTHER_DRIVE
             if self.change.statistic > 1.0 and not self.since:
                 self.since, self.alarms = self.change.onset, self.alarms + 1
                 self._best = (0, 0.0)
-            elif self.change.watched and self.change.statistic < CLEARED:
+            elif is_compared and self.change.statistic < CLEARED:
                 self.since = 0
             known = score.stamp - self.change.onset, self.change.statistic
             if self.since and self.change.statistic > 1.0 and known > self._best:
