@@ -65,6 +65,8 @@ class Plan:
         State of the model before and after the drive.
     band : Band
         Low-pass filter of the path.
+    start_is_known : bool
+        False if the stage was driven before its voltages were received: the error can then exceed the expected one.
     """
 
     wanted: Array
@@ -80,6 +82,7 @@ class Plan:
     start: ChainState
     end: ChainState
     band: Band
+    start_is_known: bool = True
 
     @property
     def path_predicted(self) -> Array:

@@ -52,7 +52,8 @@ class Compensation:
     def __init__(self, lab, known=MODEL, driver=None, **parameters):
         self.lab = lab
         self.statuses = lab.listen(DiagnosticStatus, "status", STATUS)
-        self.driver = lab.driver(**(driver or {**DRIVER, "real_time_factor": 1.0}))
+        if driver is not False:  # there is one already
+            self.driver = lab.driver(**(driver or {**DRIVER, "real_time_factor": 1.0}))
         self.samples = lab.streaming()
         model = str(save(known, lab.folder / "model.yaml")) if known is not None else ""
         self.process = lab.start(NODE, **{"model_file": model, "approach": 0.05, **parameters})
@@ -168,6 +169,19 @@ def test_a_hold_that_the_driver_ended_is_not_resumed(lab, end):
     assert len(sent) == before and abs(node.samples.newest.voltage[-1]) < 1e-3
 
 
+def test_displacements_in_quick_succession_end_at_the_last_one(lab):
+    """The stage has gone further than was known when the last voltage was computed, and is in another loop."""
+    node = Compensation(lab, driver={**DRIVER, "real_time_factor": 1.0, "ramp_rate": 15.0})
+    publisher = lab.publisher(Float64, "set_displacement")
+    publisher.publish(Float64(data=0.8 * STROKE))
+    node.until("set_displacement", "set")
+    lab.pause(0.3)
+    publisher.publish(Float64(data=0.3 * STROKE))
+    lab.pause(0.1)
+    lab.wait(lambda: np.ptp(node.samples.voltage[-5000:]) < 0.01, "half a second of rest")
+    assert abs(float(np.mean(node.samples.newest.displacement)) - 0.3 * STROKE) < 0.001 * STROKE
+
+
 def test_a_displacement_that_the_driver_refuses_is_not_said_to_be_held(lab):
     """Another client's command was playing, and "set" stood for ever where nothing had moved."""
     node = Compensation(lab, integral_time=0.3)
@@ -258,6 +272,24 @@ def test_a_path_begins_in_the_loop_that_was_driven_before_the_model_came(lab):
     assert abs(settled - wanted[0]) > 0.02 * STROKE, "at rest at this voltage the stage would be elsewhere"
     node.send(wanted)
     assert float(values_of(node.until("scan", "done"))["rms"]) < 0.004 * STROKE
+
+
+def test_the_expected_error_is_in_doubt_where_the_loop_is_unknown(lab):
+    lab.driver(**DRIVER, real_time_factor=1.0)
+    samples, statuses = lab.streaming(), lab.statuses()
+    lab.send(5.0 * (1.0 - np.cos(4.0 * np.pi * PERIOD * np.arange(3750))), "loop", PERIOD)
+    lab.wait(lambda: "done" in lab.states(statuses, "loop"), "the loop")
+    node = Compensation(lab, driver=False)
+    node.send(scan(0.4, 0.6), "late")
+    late = node.until("late", "done")
+    assert float(values_of(late)["rms"]) > 2.0 * float(values_of(late)["expected"])
+    assert "driven before its voltages were received" in late.message
+    for phase in ("wide", "known"):
+        node.send(scan(0.3, 0.9, duration=1.0), phase)
+        known = node.until(phase, "done")
+    assert "driven before" not in known.message
+    assert float(values_of(known)["rms"]) < float(values_of(known)["expected"])
+    assert samples.lost == 0
 
 
 def test_learning_claims_the_stage_and_leaves_it_safe(lab):

@@ -40,6 +40,8 @@ class AppliedState:
     ----------
     voltage : float
         Newest voltage [V].
+    is_held : bool
+        Whether the newest block was at one voltage.
     noise : float
         Rms noise of the sensor, from its changes between samples while the drive is held; 0 before that [m].
     """
@@ -47,6 +49,7 @@ class AppliedState:
     def __init__(self, sample_period: float) -> None:
         self.sample_period = sample_period
         self.voltage = self.noise = 0.0
+        self.is_held = False
         self._predictor = Predictor(sample_period)
         self._wanted: Model | None = None
 
@@ -54,6 +57,11 @@ class AppliedState:
     def is_ready(self) -> bool:
         """Whether the newest model has been run over the applied voltages."""
         return self._predictor.state is not None and not self._predictor.is_swapping
+
+    @property
+    def is_known(self) -> bool:
+        """False while voltages that were not received influence the state."""
+        return not self._predictor.warming_up
 
     @property
     def model(self) -> Model:
@@ -110,8 +118,8 @@ class AppliedState:
             follows_gap=block.follows_gap,
             settled=block.index[0] == 0 or block.phase[0] == 0,
         )
-        self.voltage = float(block.voltage[-1])
-        if block.size > 1 and is_held(block.voltage):
+        self.voltage, self.is_held = float(block.voltage[-1]), is_held(block.voltage)
+        if block.size > 1 and self.is_held:
             self.noise = float(np.sqrt(0.5 * np.mean(np.diff(block.displacement) ** 2)))
 
 

@@ -47,7 +47,7 @@ from .path_runs import TICK, Job, PathError, PathRuns
 from .set_point import SetPoint, volts_per_metre
 from .settings import COMPENSATION
 from .status import ENDED, CompensationStatus
-from .trajectory import described, trajectory_from_cloud, trajectory_to_cloud, why_not
+from .trajectory import described, doubt, trajectory_from_cloud, trajectory_to_cloud, why_not
 
 
 class CompensationNode(GuardedNode):
@@ -154,8 +154,8 @@ class CompensationNode(GuardedNode):
             self._status.refuse("set_displacement", str(error))
             return
         voltage, slope = float(found.voltage[-1]), volts_per_metre(applied.model, limits)
-        self._set_point.go(float(message.data), voltage, slope, limits)
-        self._status.show("set", f"{1e6 * message.data:.6g} µm by {voltage:.6g} V", "set_displacement")
+        self._set_point.go(float(message.data), voltage, slope, limits, in_motion=not applied.is_held)
+        self._status.show("set", f"{1e6 * message.data:.6g} µm by {voltage:.6g} V{doubt(found)}", "set_displacement")
 
     def _ready(self, moves: bool = False) -> tuple[AppliedState, Limits]:
         """The state of the model, and the limits of the driver.
@@ -191,6 +191,8 @@ class CompensationNode(GuardedNode):
             send(self._error, Float64(data=error))
             send(self._rms, Float64(data=tracking.rms or 0.0))
         self._set_point.hold(TICK, self._driver, self._status.lost)
+        if self._applied is not None and (target := self._set_point.to_plan_again(self._applied.is_held)) is not None:
+            self._on_set_displacement(Float64(data=target))
         if self._job is None:
             return
         try:

@@ -20,6 +20,7 @@ import threading
 import time
 from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ from ..identification.wait_limit import WaitLimit
 from .applied_state import AppliedState
 from .status import CompensationStatus
 from .tracking import Tracking
-from .trajectory import described, why_not
+from .trajectory import described, doubt, why_not
 
 TICK = 0.02
 """Period at which a job goes on [s]."""
@@ -82,7 +83,7 @@ class PathRuns:
 
     def planned(self, applied: AppliedState, wanted: np.ndarray, limits: Limits, way_back: bool = True) -> Plan:
         """Plan of a path (n,) [m] that starts at the present state of the stage, which `applied` contains."""
-        return plan(
+        found = plan(
             applied.model,
             wanted,
             limits,
@@ -91,6 +92,7 @@ class PathRuns:
             way_back=self._values["way_back"] if way_back else 0.0,
             approximate=self._values["approximate"],
         )
+        return replace(found, start_is_known=applied.is_known)
 
     def _until(self, condition: Callable[[], bool], missing: str) -> Job:
         waited = 0.0
@@ -149,7 +151,7 @@ class PathRuns:
 
     def _report_result(self, name: str, tracking: Tracking) -> None:
         rms, expected = tracking.rms or 0.0, tracking.plan.expected.total
-        reason = f"{1e9 * rms:.1f} nm rms, expected {1e9 * expected:.1f} nm"
+        reason = f"{1e9 * rms:.1f} nm rms, expected {1e9 * expected:.1f} nm{doubt(tracking.plan)}"
         self._status.show("done", reason, name, first_index=tracking.path_index, rms=rms, expected=expected)
 
     def _play(self, name: str, found: Plan) -> Generator[None, None, Tracking]:

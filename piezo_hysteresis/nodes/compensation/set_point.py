@@ -62,6 +62,7 @@ class SetPoint:
         self._target: float | None = None
         self._voltage = self._slope = 0.0
         self._limits, self._sent_at = Limits(), math.inf
+        self._in_motion = False
         self._await_arrival()
 
     def _await_arrival(self) -> None:
@@ -74,10 +75,30 @@ class SetPoint:
         """Whether a displacement is held."""
         return self._target is not None
 
-    def go(self, target: float, voltage: float, slope: float, limits: Limits) -> None:
-        """Hold a displacement [m] by a voltage [V]; `slope` is that of voltage against displacement [V/m]."""
+    def go(self, target: float, voltage: float, slope: float, limits: Limits, in_motion: bool = False) -> None:
+        """Hold a displacement [m] by a voltage [V].
+
+        Parameters
+        ----------
+        target, voltage : float
+            Displacement [m], and the voltage for it [V].
+        slope : float
+            Slope of voltage against displacement [V/m].
+        limits : Limits
+            Limits of the voltage.
+        in_motion : bool
+            True if the stage moved when the voltage was computed; it has gone further than was known then.
+        """
+        self._in_motion = in_motion or (self.is_holding and not self._has_arrived)
         self._target, self._voltage, self._slope, self._limits = target, voltage, slope, limits
         self._send()
+
+    def to_plan_again(self, at_rest: bool) -> float | None:
+        """Displacement [m] of a stage that has arrived, if its voltage was computed while it moved; else None."""
+        if self._target is None or not (self._in_motion and self._has_arrived and at_rest):
+            return None
+        self._in_motion = False
+        return self._target
 
     def leave(self) -> None:
         """End the hold, because something else drives the stage."""

@@ -69,7 +69,15 @@ def described(plan: Plan) -> str:
         f"at most {slew_text(plan.largest_slew, 4)}, expected error {1e9 * expected.total:.1f} nm rms "
         f"(plan {1e9 * expected.planned:.1f} nm, {stated}), "
         + ("the whole path is reachable" if plan.reachability.is_whole else why_not(plan))
+        + doubt(plan)
     )
+
+
+def doubt(plan: Plan) -> str:
+    """Why the error can exceed the expected one; empty if nothing speaks for it."""
+    if plan.start_is_known:
+        return ""
+    return "; the stage was driven before its voltages were received, so that the error can be larger"
 
 
 def why_not(plan: Plan) -> str:
