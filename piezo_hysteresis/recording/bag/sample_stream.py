@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import Any
 
@@ -31,26 +30,13 @@ from ..segmentation.segment import Segment
 from ..table.column import Column, changes
 from ..table.time_column import round_period
 from .block_message import BlockMessage
+from .driver_run import LONGEST_SILENCE, Run
 
 PERIOD_TOLERANCE = 0.01
 """Largest relative difference of the sample periods of blocks that belong together."""
 
 UNEVEN = 0.1
 """Deviation of a step in the times of a block from their mean, as a share of it, above which it is reported."""
-
-LONGEST_SILENCE = 60.0
-"""An index that runs ahead of the clock by more than this shows a restart of the driver, not a gap [s]."""
-
-
-@dataclass
-class _Run:
-    """Samples since one start of the driver: index and arrival (start, stop) of every uninterrupted piece."""
-
-    first: bool
-    period: float
-    expected: int
-    begin: int
-    pieces: list[tuple[int, int, int]] = field(default_factory=list)
 
 
 class SampleStream:
@@ -160,35 +146,33 @@ class SampleStream:
         block = self._block_of(arrival)
         return self._times_ns[block] + round((arrival - self._starts[block]) * period * 1e9)
 
-    def _runs(self) -> list[_Run]:
+    def _elapsed(self, run: Run, arrival: int, period: float) -> float:
+        """Time from the newest sample of a run to another one [s], by their stamps."""
+        return (self._time_ns(arrival, period) - self._time_ns(run.newest, run.period)) * 1e-9
+
+    def _runs(self) -> list[Run]:
         periods = self._block_periods()
         index = self._index.array()
         other = np.abs(np.diff(periods)) > PERIOD_TOLERANCE * periods[1:]
         jumps = changes(index, 1)
         edges = np.unique(np.concatenate(([0], jumps, np.array(self._starts, np.int64)[1:][other], [index.size])))
-        runs: list[_Run] = []
+        runs: list[Run] = []
         for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             period = float(periods[self._block_of(a)])
             run, step = (runs[-1], _signed(int(index[a]) - runs[-1].expected)) if runs else (None, 0)
-            if run is None or self._restarted(a, step, period, run.period):
-                run, step = _Run(True, period, int(index[a]), int(index[a])), 0
+            if run is None or run.ends_before(step, period, self._elapsed(run, a, period)):
+                run, step = Run(True, period, int(index[a]), int(index[a])), 0
                 runs.append(run)
             elif abs(period / run.period - 1) > PERIOD_TOLERANCE:
-                run = _Run(False, period, run.expected, run.expected)
+                run = Run(False, period, run.expected, run.expected)
                 runs.append(run)
-            start = run.expected + step
-            run.pieces.append((start, a, b))
-            run.expected = max(run.expected, start + b - a)
+            run.add(run.expected + step, a, b)
         for run in runs:
             same = periods[np.abs(periods / run.period - 1) <= PERIOD_TOLERANCE]
             run.period = round_period(float(np.median(same)))
         return runs
 
-    def _restarted(self, arrival: int, step: int, period: float, before: float) -> bool:
-        elapsed = (self._time_ns(arrival, period) - self._time_ns(arrival - 1, before)) * 1e-9
-        return elapsed > 0 if step < 0 else step * period > 10 * max(elapsed, 0.0) + LONGEST_SILENCE
-
-    def _cut(self, run: _Run, begin: float, split_phases: bool, notices: list[Notice]) -> Iterator[Segment]:
+    def _cut(self, run: Run, begin: float, split_phases: bool, notices: list[Notice]) -> Iterator[Segment]:
         pieces, repeated = _swept(run.pieces)
         if repeated:
             notices.append(

@@ -234,6 +234,23 @@ def test_a_driver_that_starts_again_does_not_continue(tmp_path):
     assert "restart" in kinds(experiment)
 
 
+@pytest.mark.parametrize("back", [0.1, 1.5, 3600.0])
+def test_a_driver_that_starts_again_after_its_clock_was_set_back_loses_nothing(tmp_path, back):
+    """Its samples have indices that were there before, at other times: they are no repetitions."""
+    with BagWriter(tmp_path / "bag") as bag:
+        first = Driver(bag)
+        first.phase(1, "sine")
+        before = first.play(200)
+        again = Driver(bag, clock_ns=first.clock_ns - round(back * 1e9), seed=1)
+        again.phase(1, "noise")
+        after = again.play(200)
+    experiment = read(tmp_path / "bag")
+    assert [(r.phase, r.continues) for r in experiment] == [("sine", False), ("noise", False)]
+    for record, blocks in zip(experiment, (before, after), strict=True):
+        np.testing.assert_array_equal(record.voltage, np.concatenate([b.channels["voltage"] for b in blocks]))
+    assert "restart" in kinds(experiment) and "duplicate" not in kinds(experiment)
+
+
 def test_a_bag_that_starts_in_mid_phase_marks_it_truncated(tmp_path):
     with BagWriter(tmp_path / "bag") as bag:
         driver = Driver(bag, index=12345)
