@@ -38,7 +38,7 @@ from ..identification.records.excitation_check import check_motion
 from ..identification.records.noise import without_voltage_noise
 from ..identification.records.noise_floor import floors, stroke
 from ..identification.records.one_axis import one_axis
-from ..identification.stage_check import StageCheck, after_a_loop, check_stage, moving_in
+from ..identification.stage_check import StageCheck, check_stage, moving_after_a_loop, moving_in
 from ..model.model import Model
 from ..model.provenance import LARGEST, MOVING, known_error, knows_unseen_records, with_origin
 from ..record import Experiment, Notice
@@ -134,8 +134,12 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
     axes_notices = one_axis(experiment)
     quiet, noise_notices = without_voltage_noise(experiment)
     notices = (*axes_notices, *noise_notices)
-    records = after_a_loop(quiet.records)
-    used = moving_in(records)
+    records, used = moving_after_a_loop(quiet.records)
+    if not used and moving_in(quiet.records):
+        raise IdentificationError(
+            "recalibrate: the drive does not move after it has been at both ends of its range, so that all motion "
+            "depends on what the stage did before these records; expected a further loop or step"
+        )
     check_motion("recalibrate", [records[i] for i in used])
     least = floors(records)
     limits = np.maximum(least, known_error(model, MOVING)).tolist()

@@ -32,8 +32,8 @@ from ..model.provenance import LARGEST, known_error, knows_unseen_records
 from ..record import CONDITIONING, Record
 from .fit.normal_equations import residuals
 from .free_run_error import free_per_record
-from .records.conditioning_split import conditioning_length, covers
-from .records.excitation_check import SHORTEST_RECORD, check_motion, moves
+from .records.conditioning_split import AT_THE_END, conditioning_length, covers
+from .records.excitation_check import SHORTEST_RECORD, check_motion, moves, travel
 from .records.noise_floor import floors, stroke
 
 Array = NDArray[np.float64]
@@ -62,12 +62,15 @@ class StageCheck:
         none.
     unseen : bool
         Whether a record that was not fitted is part of the known error, so that it holds for other records.
+    after_loop : bool
+        Whether only what follows a full loop of the drive is judged; else the state at the start is assumed.
     """
 
     percent: float
     largest: float
     known: float
     unseen: bool = True
+    after_loop: bool = True
 
     @property
     def is_as_good(self) -> bool:
@@ -92,8 +95,9 @@ def check_stage(model: Model, records: Sequence[Record], known: Model | None = N
     IdentificationError
         If the stage or its drive does not move.
     """
-    cut = after_a_loop(records)
-    used = moving_in(cut)
+    cut, used = moving_after_a_loop(records)
+    if not (after_loop := bool(used)):  # a step or a ramp that only holds afterwards
+        cut, used = tuple(records), moving_in(records)
     check_motion("validate", [cut[i] for i in used])
     single, span = record_errors_of(model, cut, used), stroke(cut)
     reference = model if known is None else known
@@ -105,6 +109,7 @@ def check_stage(model: Model, records: Sequence[Record], known: Model | None = N
         100.0 * float(single.max()) / span,
         100.0 * max(stated, floor) / span if stated else 0.0,
         knows_unseen_records(reference),
+        after_loop,
     )
 
 
@@ -122,6 +127,14 @@ def moving_in(records: Sequence[Record]) -> list[int]:
     long = [i for i, r in enumerate(records) if r.size >= SHORTEST_RECORD and r.phase != CONDITIONING]
     used = [i for i in long if moves(records[i])]
     return [i for i in used if not records[i].truncated] or used
+
+
+def moving_after_a_loop(records: Sequence[Record]) -> tuple[tuple[Record, ...], list[int]]:
+    """The records after a loop, and those in which the drive moves; none if it only reaches the end of its range."""
+    cut = after_a_loop(records)
+    used = moving_in(cut)
+    way = 2.0 * AT_THE_END * max((travel(records[i]) for i in moving_in(records)), default=0.0)
+    return cut, used if any(travel(cut[i]) > way for i in used) else []
 
 
 def after_a_loop(records: Sequence[Record]) -> tuple[Record, ...]:

@@ -48,12 +48,13 @@ def stage_sentence(check: StageCheck, percent: float, cause: str) -> str:
     if check.is_as_good or not describes(percent):
         return error_sentence(percent)
     ratio = f"{check.largest:.3g} %, {check.largest / check.known:.2g} times the largest"
+    one = "in one record, after its first full loop," if check.after_loop else "in one record"
     if not check.unseen:
         return (
-            f"{error_sentence(percent)} In one record, after its first full loop, it is {ratio} of the records that "
-            f"were fitted, of which none was left out{cause}"
+            f"{error_sentence(percent)} {one.capitalize()} it is {ratio} of the records that were fitted, of which "
+            f"none was left out{cause}"
         )
     return (
         f"The model does not describe this stage as well as it is known to: its error in free run is {percent:.3g} % "
-        f"of the range, and in one record, after its first full loop, {ratio} that the model is known to have{cause}"
+        f"of the range, and {one} {ratio} that the model is known to have{cause}"
     )

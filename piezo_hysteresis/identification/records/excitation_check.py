@@ -91,7 +91,12 @@ def missing_excitation(
 
 def moves(record: Record) -> bool:
     """Whether the drive moves in a record."""
-    return bool(np.ptp(np.append(record.voltage, record.settled_voltage)) > 0.0)
+    return travel(record) > 0.0
+
+
+def travel(record: Record) -> float:
+    """Range of the drive in a record, from the level before it [V]."""
+    return float(np.ptp(np.append(record.voltage, record.settled_voltage)))
 
 
 def check_motion(name: str, moving: Collection[Record]) -> None:
