@@ -43,6 +43,7 @@ from .one_core import on_one_core
 from .published_steps import delay_of_steps, published_steps
 from .records.conditioning import records_to_fit
 from .records.conditioning_split import known_from_within
+from .records.excitation_check import one_way
 from .records.leading_step import Blocks, steps_apart
 from .records.noise import sensor_noise, without_voltage_noise
 from .records.one_axis import one_axis
@@ -238,6 +239,7 @@ def identify(
             Notice("not_identifiable", f"{a} and {b} are not determined separately; record whole loops", severe=True)
             for a, b, _ in correlated_pairs(joint, INSEPARABLE)
         ]
+    notices += one_way(records, roles.fitted)
     unseen = not all(p.is_fitted for p in phases)
     if not unseen:
         notices.append(

@@ -15,8 +15,9 @@
 """An effect is reported as not excited exactly if the experiment cannot show it."""
 
 import numpy as np
+import pytest
 
-from piezo_hysteresis.identification.records.excitation_check import missing_excitation
+from piezo_hysteresis.identification.records.excitation_check import missing_excitation, one_way
 from piezo_hysteresis.record import Record
 
 TIME = 1e-3 * np.arange(2000)
@@ -109,3 +110,20 @@ def test_a_step_in_the_first_sample_excites_the_dynamics():
     assert "can hardly show extra_resonance and lags" in missing(record(slow))
     said = missing(record(slow[::10], 1e-2, initial_voltage=0.0))
     assert "can hardly show extra_resonance, because the samples after the steps are too far apart" in said
+
+
+UP = np.interp(np.arange(300), [50, 250], [0.0, 5.0])
+
+
+@pytest.mark.parametrize("drive", [UP, -UP, np.repeat([0.0, 5.0], 100), np.full(100, 5.0)])
+def test_a_drive_that_never_turns_back_does_not_show_the_loop(drive):
+    (notice,) = one_way([record(drive, phase="ramp", initial_voltage=0.0)], [0])
+    assert notice.severe
+
+
+@pytest.mark.parametrize("continues", [True, False])
+def test_a_record_that_turns_back_or_continues_one_shows_the_loop(continues):
+    back = record(UP[::-1], continues=continues)
+    assert not one_way([record(np.append(UP, UP[::-1]))], [0])
+    assert (one_way([record(UP), back], [0, 1]) == ()) is continues
+    assert one_way([record(UP), back], [0])

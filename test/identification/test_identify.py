@@ -186,6 +186,12 @@ def test_loops_after_a_gap_are_fitted_where_nothing_else_moves():
     assert found.free_run_error == pytest.approx(NOISE, rel=0.2)
 
 
+def test_a_stage_that_was_never_driven_back_is_not_said_to_be_known():
+    (whole,) = play(("ramp", np.linspace(0.0, 8.0, 4000)))
+    (found,) = (n for n in identify(whole[:3000]).notices if n.kind == "one_way")
+    assert found.severe
+
+
 @pytest.mark.parametrize(("size", "gain", "message"), [(1000, 0.0, "never changes"), (5, 1e-6, "got 5 samples in")])
 def test_a_dead_sensor_or_a_few_samples_are_named(size, gain, message):
     voltage = np.linspace(0.0, 9.0, size)

@@ -99,6 +99,27 @@ def travel(record: Record) -> float:
     return float(np.ptp(np.append(record.voltage, record.settled_voltage)))
 
 
+def one_way(records: Sequence[Record], used: Collection[int]) -> tuple[Notice, ...]:
+    """Notice ``one_way`` if the drive has turned back in none of the used records, nor in those that they continue."""
+    least = MOVED * max(travel(records[i]) for i in used)
+    low = high = rise = fall = 0.0
+    for i, record in enumerate(records):
+        u = record.voltage
+        if not record.continues:
+            low = high = record.settled_voltage
+            rise = fall = 0.0
+        rise = max(rise, float(np.max(u - np.minimum(low, np.minimum.accumulate(u)))))
+        fall = max(fall, float(np.max(np.maximum(high, np.maximum.accumulate(u)) - u)))
+        low, high = min(low, float(u.min())), max(high, float(u.max()))
+        if i in used and min(rise, fall) > least:
+            return ()
+    message = (
+        "the drive never turns back, so the hysteresis is not determined: the way back may differ from the prediction "
+        "by the height of the loop; record whole loops"
+    )
+    return (Notice("one_way", message, severe=True),)
+
+
 def check_motion(name: str, moving: Collection[Record]) -> None:
     """Check that the stage moves in some of the records in which the drive moves.
 
