@@ -30,6 +30,10 @@ _REGULAR = 0.1
 """Relative difference up to which two periods are alike."""
 _STRAIGHT = 0.03
 """Largest rms deviation of a straight swing, share of the swing."""
+_RESOLVED = 3
+"""Fewest sample periods of a usual swing that can be told from a straight line."""
+_EDGE, _STRAIGHT_EDGE, _LONG_EDGE = 0.05, 0.01, 8
+"""Both ends of a swing that may be held levels, largest deviation between them, shares of the swing; fewest samples."""
 _MAJORITY = 0.8
 """Share of the whole swings that have the shape of a wave which grows or shrinks."""
 _FEWEST = 4
@@ -47,8 +51,9 @@ _UNCERTAIN = 0.05
 def phase_name(voltage: Samples, sample_period: float) -> str:
     """Propose the phase name of a drive signal without pauses.
 
-    A swing is the movement from one turning point to the next. Straight swings make a triangle, swings of equal
-    duration with periods that a sine fits make a sine; other periodic drives are a multisine, and all others are noise.
+    A swing is the movement from one turning point to the next. Straight swings make a triangle, straight ones between
+    held levels a trapezoid, and swings of equal duration with periods that a sine fits a sine; other periodic drives
+    are a multisine, and all others are noise.
 
     Parameters
     ----------
@@ -60,7 +65,7 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
     Returns
     -------
     str
-        One of rest, step, ramp, steps, chirp, triangle, minor_loops, ``sine_<f>hz``, multisine, noise.
+        One of rest, step, ramp, steps, chirp, triangle, minor_loops, trapezoid, ``sine_<f>hz``, multisine, noise.
 
     Examples
     --------
@@ -90,11 +95,13 @@ def phase_name(voltage: Samples, sample_period: float) -> str:
     usual = float(np.median(periods)) if periods.size else 2.0 * float(swings[0])
     like = periods[np.abs(periods - usual) <= _REGULAR * usual]
     regular = like.size >= 0.8 * periods.size - 1  # one may belong to the motion before or after
-    if straight < _STRAIGHT:
+    if straight < _STRAIGHT and (regular or np.median(np.diff(turns)) >= _RESOLVED):
         return "triangle" if regular else "minor_loops"
     shapes = swing_shapes(voltage, turns)[1:-1]
     if regular and np.count_nonzero(shapes == STRAIGHT) >= max(_FEWEST, _MAJORITY * shapes.size):
         return "triangle"
+    if _has_straight_edges(voltage, turns):
+        return "trapezoid"
     period = float(np.mean(like)) if like.size else usual
     body = voltage[turns[0] if turns.size <= 3 else turns[1] :]
     cosines = np.count_nonzero(shapes == COSINE) >= max(_FEWEST, _MAJORITY * shapes.size)
@@ -141,6 +148,19 @@ def _straightness(voltage: Samples, turns: NDArray[np.int64]) -> float:
             way = (voltage[a : b + 1] - voltage[a]) / (voltage[b] - voltage[a])
             deviations.append(float(np.sqrt(np.mean((way - np.linspace(0.0, 1.0, b - a + 1)) ** 2))))
     return float(np.median(deviations[1:] or deviations))
+
+
+def _has_straight_edges(voltage: Samples, turns: NDArray[np.int64]) -> bool:
+    """True where the swings are straight apart from their ends, where the drive may be held."""
+    swings = list(itertools.pairwise(turns.tolist()))
+    deviations = []
+    for a, b in swings[:: max(1, len(swings) // 200)]:
+        way = (voltage[a : b + 1] - voltage[a]) / ((voltage[b] - voltage[a]) or 1.0)
+        edge = way[(way > _EDGE) & (way < 1.0 - _EDGE)]
+        if edge.size < _LONG_EDGE:
+            return False
+        deviations.append(float(np.sqrt(np.mean((edge - np.linspace(edge[0], edge[-1], edge.size)) ** 2))))
+    return float(np.median(deviations)) < _STRAIGHT_EDGE
 
 
 def _is_sine(voltage: Samples, period: float) -> bool:

@@ -192,3 +192,23 @@ def test_a_long_sine_keeps_three_digits():
 
 def test_the_name_of_a_fast_sine_is_a_plain_number():
     assert phase_name(np.sin(2 * np.pi * 1.25e4 * np.arange(4000) * 2e-6), 2e-6) == "sine_12500hz"
+
+
+@pytest.mark.parametrize("size", [200, 4000])
+def test_white_noise_is_noise(size):
+    """A swing of one sample is straight, whatever the drive."""
+    drive = np.random.default_rng(3).standard_normal(size)
+    assert [name for _, name in propose(drive, 1e-3)] == ["noise"]
+
+
+@pytest.mark.parametrize("hold", [0.2, 0.3])
+def test_straight_motion_with_short_holds_is_a_trapezoid(hold):
+    """One, or a wave: a hold that is short against the motion counts as the top of a wave."""
+    times = np.cumsum([0.3, 1.0, hold, 1.0, hold] + [1.0, hold] * 4 + [0.3])
+    levels = [0.0, 8.0, 8.0, 0.0, 0.0, 8.0, 8.0, 0.0, 0.0, 8.0, 8.0, 0.0, 0.0, 0.0]
+    for count in (4, times.size):
+        drive = np.interp(np.arange(round(1e3 * times[count - 1])) * 1e-3, times[:count], levels[:count])
+        names = [name for _, name in propose(drive, 1e-3)]
+        assert "trapezoid" in names
+        assert not {"noise", "multisine"} & set(names)
+        assert not any(name.startswith("sine") for name in names)
