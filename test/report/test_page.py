@@ -23,8 +23,10 @@ import subprocess
 from base64 import b64decode
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.resources import files
 
 import pytest
+from matplotlib.image import imread
 
 from piezo_hysteresis.discrepancy import Conclusion
 from piezo_hysteresis.errors import RecordingError
@@ -205,6 +207,19 @@ def test_a_browser_shows_every_figure_and_reaches_every_link_by_keyboard(drawn, 
     assert page["reached"] == links
     assert page["grown"] > 1.5, "a click enlarges a figure"
     assert not page["wide"], "nothing scrolls sideways but tables and figures in their own frames"
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium on this machine")
+@pytest.mark.parametrize("style", ["page.css", "live/page.css"])
+def test_a_browser_in_dark_mode_leaves_the_page_light(tmp_path, style):
+    """It would turn the black lines and words of the figures white, on figures that stay white."""
+    page, picture = tmp_path / "page.html", tmp_path / "page.png"
+    css = (files("piezo_hysteresis.report") / style).read_text(encoding="utf-8")
+    page.write_text(f"<!DOCTYPE html><style>{css}</style><p>words", encoding="utf-8")
+    dark = ["--force-dark-mode", "--enable-features=WebContentsForceDark", f"--screenshot={picture}"]
+    command = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}/profile", *dark]
+    subprocess.run([*command, page.as_uri()], capture_output=True, timeout=120, check=True)
+    assert imread(picture)[-1, -1, :3].min() == 1.0
 
 
 def test_a_correction_without_a_name_is_drawn_and_tabled_only_where_it_is_accepted(answer):
