@@ -176,8 +176,12 @@ class Description:
             too_steep = step > steepest * (1 + 1e-9) + 1e-12
             if too_steep.any():
                 first = int(np.argmax(too_steep))
+                start, remedy = "", "make the drive slower"
+                if first == 0:
+                    start = f" from the present voltage of {present_voltage:.9g} V"
+                    remedy = f"move the stage to {block[0]:.9g} V first, e.g. by `set_voltage`"
                 raise StageError(
-                    f"{self.name}: drive sample {first} steps by {step[first]:.9g} V, expected at most {steepest:g} V "
-                    f"per sample ({slew_text(self.max_slew_rate)}); nothing was played"
+                    f"{self.name}: drive sample {first} steps by {step[first]:.9g} V{start}, expected at most "
+                    f"{steepest:g} V per sample ({slew_text(self.max_slew_rate)}); nothing was played; {remedy}"
                 )
         return block

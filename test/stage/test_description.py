@@ -48,6 +48,7 @@ def test_a_drive_within_limits_passes_unchanged(levels):
         (np.zeros(1001), "at most 1000"),
         ([0.0, 0.04, 0.2], "sample 2 steps by 0.16 V"),
         ([2.0], "sample 0 steps by 2 V"),
+        ([2.0], "from the present voltage of 0 V.*move the stage to 2 V first"),
     ],
 )
 def test_a_drive_outside_limits_is_refused_whole(voltage, says):
