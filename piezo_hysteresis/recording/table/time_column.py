@@ -22,19 +22,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import RecordError, RecordingError
+from ...errors import RecordError, RecordingError, counted
 from ...record import Notice, Samples
 
 JITTER = 0.02
 """Deviation of the steps from their mean, in sample periods (rms), above which it is reported."""
-
-
 LONGEST_DELAY = 2.5
 """Step in sample periods up to which it may be a late time, because the times after it are where they would be."""
 WINDOW = 8
 """Number of times before and after such a step that decide."""
 LARGEST_CONTRADICTION = 0.05
 """Share by which a sample period given by hand may differ from the times of the file."""
+IN_A_ROW = 8
+"""Number of long steps in a row from which samples are not missing, but were taken at a longer period."""
+MUCH = 0.05
+"""Share of the time with such steps that makes the finding severe."""
 COARSE = 0.05
 """Share of times equal to the one before from which the clock is coarser than the sample period."""
 
@@ -50,6 +52,37 @@ def round_period(period: float, tolerance: float = 1e-12) -> float:
         if abs(short - period) <= tolerance * period:
             return short
     return period
+
+
+@dataclass(frozen=True, slots=True)
+class SlowerPart:
+    """Samples that were taken at a longer period than most: begin, end and step [s], number, share of the time."""
+
+    begin: float
+    end: float
+    step: float
+    count: int
+    share: float
+
+    @classmethod
+    def of(cls, time: Samples, long: NDArray[np.bool_]) -> SlowerPart | None:
+        """The samples after `IN_A_ROW` or more long steps in a row; None if there are none."""
+        edges = np.flatnonzero(np.diff(long.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+        runs = [(int(a), int(b)) for a, b in edges if b - a >= IN_A_ROW]
+        if not runs:
+            return None
+        steps = np.concatenate([np.diff(time[a : b + 1]) for a, b in runs])
+        share = float(steps.sum()) / abs(float(time[-1] - time[0]))
+        return cls(float(time[runs[0][0]]), float(time[runs[-1][1]]), float(np.median(steps)), steps.size, share)
+
+    def notice(self, period: float, phase: str) -> Notice:
+        """The finding, with what to do."""
+        text = (
+            f"{self.count} samples between {self.begin:.6g} and {self.end:.6g} s are about {self.step:.3g} s apart, "
+            f"expected {period:g} s as most others; they are not used; read each part with one period by itself, by "
+            "`rows`, or sample all at one period"
+        )
+        return Notice("time_base", text, phase, severe=self.share > MUCH)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -70,6 +103,8 @@ class TimeColumn:
         Samples that have the time of the one before and shift all times after them; nothing is missing there.
     is_coarse : bool
         True if the clock is coarser than the sample period, so that many times are equal.
+    slower : SlowerPart, optional
+        Samples that were taken at a longer period than most.
     """
 
     period: float
@@ -78,6 +113,7 @@ class TimeColumn:
     jitter: float
     repeated: NDArray[np.int64]
     is_coarse: bool
+    slower: SlowerPart | None = None
 
     @classmethod
     def of(cls, time: Samples) -> TimeColumn:
@@ -123,7 +159,8 @@ class TimeColumn:
         lost = np.maximum(np.rint(steps[broken] / period).astype(np.int64) - 1, 0)
         jitter = float(np.sqrt(np.mean((whole - mean) ** 2))) / period if usual > 0 else 0.0
         lost = np.where(steps[broken] > 0, lost, 0)
-        return cls(period, breaks, lost, jitter, np.flatnonzero(repeated) + 1, is_coarse)
+        slower = SlowerPart.of(time, broken & (steps > 0))
+        return cls(period, breaks, lost, jitter, np.flatnonzero(repeated) + 1, is_coarse, slower)
 
     @property
     def gaps(self) -> tuple[dict[int, int], dict[int, int]]:
@@ -160,24 +197,29 @@ class TimeColumn:
             )
             message.append(Notice("time_base", text, phase))
         if self.repeated.size:
-            text = f"the time of the sample before is repeated at {self.repeated.size} places; the state continues"
+            places = counted(self.repeated.size, "place")
+            text = f"the time of the sample before is repeated at {places}; the state continues"
             message.append(Notice("non_monotonic", text, phase, severe=self.repeated.size > 1))
         if self.jitter > JITTER:
             message.append(
                 Notice(
                     "time_base",
                     f"steps of the time base scatter by {100 * self.jitter:.1f} % of the sample period "
-                    f"{self.period:g} s; uniform times are assumed",
+                    f"{self.period:g} s; uniform times are assumed; if the "
+                    "samples were taken at the times of the file, interpolate all channels at even times before",
                     phase,
                     severe=self.jitter > 0.5,
                 )
             )
-        if missing := int(self.lost.sum()):
-            message.append(
-                Notice("gap", f"{missing} samples are missing in {int((self.lost > 0).sum())} places", phase)
-            )
+        if self.slower is not None:
+            message.append(self.slower.notice(self.period, phase))
+        elif missing := int(self.lost.sum()):
+            what = f"{counted(missing, 'sample')} {'is' if missing == 1 else 'are'} missing in "
+            message.append(Notice("gap", what + counted(int((self.lost > 0).sum()), "place"), phase))
         if back := int((self.lost == 0).sum()):
-            message.append(Notice("non_monotonic", f"the time decreases at {back} places", phase, severe=back > 1))
+            message.append(
+                Notice("non_monotonic", f"the time decreases at {counted(back, 'place')}", phase, severe=back > 1)
+            )
         return message
 
 

@@ -395,3 +395,25 @@ def test_the_stream_of_an_interferometer_is_named(tmp_path):
     path.write_bytes(b"\0\1\2" * 100)
     with pytest.raises(RecordingError, match="attocube"):
         read(path)
+
+
+def test_a_part_at_a_longer_period_is_said_not_to_be_used(tmp_path):
+    time = np.concatenate((np.arange(0.0, 4.0, 1e-3), np.arange(4.0, 10.0, 1e-2)))
+    rows = np.column_stack((time, np.sin(9.0 * time), np.sin(9.0 * time)))
+    np.savetxt(tmp_path / "t.csv", rows, delimiter=",", header="time_s,voltage_V,displacement_um", comments="")
+    experiment = read(tmp_path / "t.csv", phases="x")
+    assert [r.size for r in experiment] == [4001]
+    (notice,) = (n for n in experiment.notices if n.kind == "time_base")
+    assert notice.message.startswith("599 samples between 4 and 9.99 s are about 0.01 s apart, expected 0.001 s")
+    assert notice.severe
+    assert not any("missing" in n.message for n in experiment.notices)
+    (slow,) = read(tmp_path / "t.csv", phases="x", rows=(4000, 4600))
+    assert slow.sample_period == pytest.approx(1e-2)
+
+
+def test_one_gap_is_one_place(tmp_path):
+    lines = text(",", "time_s,voltage_V,displacement_um\n").splitlines()
+    del lines[101:111]
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    messages = {n.kind: n.message for n in read(tmp_path / "t.csv", phases="x").notices}
+    assert messages["gap"] == "10 samples are missing in 1 place"
