@@ -39,7 +39,7 @@ from ..table.column_inference import (
     inferred_period,
     period_of,
     require_different,
-    unit_in,
+    unit_of,
 )
 from ..table.read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from ..table.time_column import TimeColumn
@@ -152,7 +152,7 @@ def _phase(file: Path, options: ReadOptions, average: int, end: float) -> tuple[
     with zipfile.ZipFile(file) as archive:
         values = NpzMembers(archive, file.stat().st_size)
         place, inferred = _places(values, options)
-        units = {c: unit_in(name, c) for c, name in place.items() if is_channel(c)}
+        units = {c: unit_of(name, c, options.units) for c, name in place.items() if is_channel(c)}
         part = options.part(values.size(place["voltage"]))
 
         def channel(name: str) -> Samples:

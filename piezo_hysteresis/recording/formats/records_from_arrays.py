@@ -34,6 +34,7 @@ from ..table.column_inference import (
     period_of,
     require_different,
     unit_in,
+    unit_of,
 )
 from ..table.read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from ..table.table import table_records
@@ -74,7 +75,7 @@ def records_from_arrays(
     channels = {c: place for c, place in places.items() if is_channel(c)}
     require_different({c: str(place) for c, place in channels.items()})
     titles = {c: str(place) if place.column else arrays.title(place.name) for c, place in channels.items()}
-    units = {c: unit_in(title, c) for c, title in titles.items()}
+    units = {c: unit_of(title, c, options.units) for c, title in titles.items()}
     buffers = {c: _samples(arrays, place, options) for c, place in channels.items()}
     columns = {c: options.in_si(c, buffer.column(0), units[c]) for c, buffer in buffers.items()}
     needed, size = {*CHANNELS, *options.columns}, columns["voltage"].size

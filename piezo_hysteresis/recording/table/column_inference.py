@@ -20,12 +20,12 @@ The result is reported and can be overridden.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
-from ...channel_mapping import axis_of
+from ...channel_mapping import axis_of, quantity_of
 from ...errors import RecordingError
 from ...record import Notice
-from .units import plain, units_of
+from .units import is_unit, plain, units_of
 
 _UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$|[\s_,/:]\s*([^\s_,/:\[\]()]+)\s*$")
 """Unit at the end of a title, in brackets or after a separator."""
@@ -52,6 +52,28 @@ def unit_in(title: str, channel: str) -> str | None:
     match = _UNIT.search(title.strip().strip('#"'))
     unit = plain(match[1] or match[2] or "") if match else ""
     return unit if unit in units_of(channel) else None
+
+
+def unit_of(title: str, channel: str, given: Collection[str]) -> str | None:
+    """The unit of `unit_in`; a displacement whose title has another unit needs one that is `given`.
+
+    A drive may be the command of a controller in any unit.
+
+    Raises
+    ------
+    RecordingError
+        If the title of a displacement ends in another unit in brackets, e.g. volts, and `given` lacks the channel.
+    """
+    match = _UNIT.search(title.strip().strip('#"'))
+    unit = match[1] if match else None
+    is_length = quantity_of(channel) == "displacement"
+    if is_length and channel not in given and unit and is_unit(unit) and unit_in(title, channel) is None:
+        raise RecordingError(
+            f"{channel}: got the unit '{unit}' in the title '{title.strip()}', expected one of "
+            f"{', '.join(units_of(channel))}; give the SI value of one {plain(unit)} by `units`, e.g. {channel}=2e-6, "
+            "or name another column by `columns`"
+        )
+    return unit_in(title, channel)
 
 
 def named_column(title: str) -> tuple[str, str | None]:

@@ -31,7 +31,7 @@ from .column_inference import (
     inferred_columns,
     named_column,
     require_different,
-    unit_in,
+    unit_of,
 )
 from .read_options import CHANNELS, LABELS, ReadOptions, is_channel
 from .time_column import TimeColumn, without_duplicates
@@ -87,14 +87,14 @@ def resolve(titles: Sequence[str], width: int, options: ReadOptions) -> Places:
             at = matches[0] if matches else width
         if at >= width:
             raise RecordingError(f"`columns`: got {column!r} for {channel}, expected {_listed(titles, width)}")
-        chosen[channel] = (at, unit_in(titles[at], channel) if titles else None)
+        chosen[channel] = (at, unit_of(titles[at], channel, options.units) if titles else None)
     used = {at for at, _ in chosen.values()}
     places = {c: p for c, p in places.items() if c in (*CHANNELS, *LABELS) or p[0] not in used} | chosen
     open_ = [c for c in ("time", "voltage", "displacement") if c not in places]
     if "time" in open_ and options.sample_period is not None:
         open_.remove("time")  # an inferred column must not contradict the others
     found = inferred_columns(titles, (at for at, _ in places.values()), open_)
-    places |= {channel: (at, unit_in(titles[at], channel)) for channel, at in found.items()}
+    places |= {channel: (at, unit_of(titles[at], channel, options.units)) for channel, at in found.items()}
     for channel in ("voltage", "displacement"):
         if channel not in places:
             taken = {at for at, _ in places.values()}

@@ -417,3 +417,15 @@ def test_one_gap_is_one_place(tmp_path):
     (tmp_path / "t.csv").write_text("\n".join(lines))
     messages = {n.kind: n.message for n in read(tmp_path / "t.csv", phases="x").notices}
     assert messages["gap"] == "10 samples are missing in 1 place"
+
+
+@pytest.mark.parametrize("title", ["sensor (V)", "Position [mV]", "displacement (s)"])
+def test_a_displacement_in_a_unit_that_is_no_length_is_not_read_as_metres(tmp_path, title):
+    (tmp_path / "t.csv").write_text(text(",", f"time_s,voltage_V,{title}\n"))
+    with pytest.raises(RecordingError, match=r"displacement: got the unit .* give the SI value of one"):
+        read(tmp_path / "t.csv")
+    with pytest.raises(RecordingError, match="give the SI value of one"):
+        read(tmp_path / "t.csv", columns={"displacement": 3})
+    (record,) = read(tmp_path / "t.csv", phases="x", units={"displacement": 2e-6})
+    (metres,) = read(tmp_path / "t.csv", phases="x", units={"displacement": "m"})
+    np.testing.assert_allclose(record.displacement, 2e-6 * metres.displacement)
