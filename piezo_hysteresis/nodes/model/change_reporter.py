@@ -139,6 +139,8 @@ class ChangeReporter:
 
     def _follow(self, model: Model) -> None:
         self._model, self._problem = model, ""
+        if self.watch.is_taking:
+            self._node.get_logger().warning("another model ended the baseline that was being taken; call ~/baseline")
         if self._adopted is not None and self._adopted[0] is model:
             self.watch, self._alarms = ChangeWatch(self.interval, self._adopted[1]), 0
             return

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RecordingError
+from ...errors import RecordingError, counted
 from ...home_path import in_home
 from ...parameter import parts_of
 from ...record import Experiment, Notice, Record
@@ -170,7 +170,7 @@ def _read_samples(bag: Bag, options: ReadOptions) -> tuple[list[Record], list[No
                 "with commas between for a stage of several axes"
             )
     if not streams:
-        raise _no_samples(axes)
+        raise _no_samples(axes, damaged)
     (space, stream), *_ = streams.items()
     segments, notices = stream.segments(split_phases=options.phases is None)
     averages = shared_averages([s.size for s in segments], options.average)
@@ -203,8 +203,13 @@ def _damage(count: int) -> list[Notice]:
     return [Notice("damaged", f"{count} messages could not be decoded and were skipped")] if count else []
 
 
-def _no_samples(axes: list[str]) -> RecordingError:
+def _no_samples(axes: list[str], damaged: int = 0) -> RecordingError:
     where = f" of {', '.join(axes)}" if axes else ""
+    if damaged:
+        return RecordingError(
+            f"got no readable samples{where}: none of {counted(damaged, 'message')} could be decoded; if they are "
+            "compressed one by one, convert the bag with `ros2 bag convert`"
+        )
     return RecordingError(
         f"got no readable samples{where} (topic 'samples', {TYPE}); map foreign topics by `columns`, e.g. "
         "voltage=/ao.data displacement=/sensor.data"

@@ -18,12 +18,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from piezo_hysteresis.errors import PiezoError, RecordingError
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.recording import BagWriter, read, recorded_model, write
+from piezo_hysteresis.recording.bag.bag import Bag
 from piezo_hysteresis.recording.bag.block_message import TYPE, BlockMessage
 from piezo_hysteresis.recording.bag.phase_topic import STRING, PhaseNames
 
@@ -232,6 +233,20 @@ def test_a_driver_that_starts_again_does_not_continue(tmp_path):
     np.testing.assert_array_equal(experiment[3].voltage, again.voltage[1])
     assert experiment[2].start_time - experiment[0].start_time == pytest.approx(3 + 12 * SIZE * PERIOD)
     assert "restart" in kinds(experiment)
+
+
+def test_compressed_messages_are_named_where_the_metadata_are_missing(whole, tmp_path):
+    """A recorder that was killed has written no metadata; other topics were proposed."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    writer = Writer(tmp_path / "packed", version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    with writer:
+        samples = writer.add_connection("/samples", TYPE, typestore=store)
+        for message in Bag(whole[0]).messages(["/samples"]):
+            writer.write(samples, message.time_ns, message.raw)
+    (tmp_path / "packed" / "metadata.yaml").unlink()
+    with pytest.raises(RecordingError, match=r"none of 12 messages could be decoded.*ros2 bag convert"):
+        read(tmp_path / "packed")
 
 
 @pytest.mark.parametrize("back", [0.1, 1.5, 3600.0])
