@@ -29,14 +29,15 @@ from ..model.model import Model
 from ..model.samples import samples
 from .approach import APPROACH, settled_start, smooth_transition
 from .band import Band
+from .expected_error import free_run_error
 from .inverse import Inverse
 from .limits import Limits
 from .reachability import NearestPath, Reachability, UnreachablePart
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 1e-4
-"""Deviations below this share of the range of the path count as zero."""
+LEAST, MOST = 1e-4, 1e-3
+"""Deviations below the free-run error of the model count as zero; these shares of the range of the path bound it."""
 
 STEPS = 8
 """Number of bisection steps in the search for the nearest path, after the first trial that works."""
@@ -93,12 +94,13 @@ def reachable(
     off = reached - np.where(no_voltage, y, aim)
     span = float(np.ptp(y)) or float(np.abs(y).max()) or model.displacement_scale
     span = min(span, model.displacement_scale)  # what is too large is not allowed a larger error
-    bad = np.flatnonzero(np.abs(off) > TOLERANCE * span)
+    tolerance = float(np.clip(free_run_error(model) or 0.0, LEAST * span, MOST * span))
+    bad = np.flatnonzero(np.abs(off) > tolerance)
     lowest, direction = _at_the_lowest_voltage(model, limits)
     parts = []
     for a, b in _runs(bad, max(1, round(2e-3 / model.sample_period))):
         worst = a + int(np.abs(off[a : b + 1]).argmax())
-        kept = direction * (float(aim[worst]) - lowest) >= -TOLERANCE * span
+        kept = direction * (float(aim[worst]) - lowest) >= -tolerance
         part = _part(model, limits, needed[a : b + free.preview + 1], a, b + 1, float(off[worst]))
         if no_voltage[worst]:
             part = replace(part, limit="model")

@@ -140,6 +140,22 @@ def test_what_no_voltage_gives_is_not_reachable(limits: Limits) -> None:
     assert plan(model, middle + nearest.amplitude * (found.wanted - middle), limits).reachability.is_whole
 
 
+def test_what_is_missed_by_less_than_the_model_knows_is_reachable() -> None:
+    """A triangle down to where the stage had been was refused for 2.7 mV, 6 nm, with a model that errs by 25 nm."""
+    model = stage()
+    drive = 2.0 * (1.0 - np.cos(2.0 * np.pi * np.arange(4000) / 2000.0))
+    _, start = model.run(drive, model.rest(0.0))
+    y, _ = model.run(drive, start)
+    assert free_run_error(model) == 5e-9
+    assert reachable(model, UNIPOLAR, y - 4e-9, start=start, search=False).is_whole
+    exact = replace(model, provenance={})
+    parts = reachable(exact, UNIPOLAR, y - 4e-9, start=start, search=False).parts
+    assert {part.limit for part in parts} == {"voltage_min"}
+    assert 1e-9 < max(part.largest for part in parts) < 5e-9
+    poor = replace(model, provenance={"free_run_error": "1e-6"})
+    assert not reachable(poor, UNIPOLAR, y - 1e-7, start=start, search=False).is_whole
+
+
 @pytest.mark.parametrize("metres", [0.5, 1.0, -1.0, 1e3])
 def test_a_path_in_micrometres_is_out_of_reach(metres: float) -> None:
     assert not reachable(stage(), UNIPOLAR, np.full(16, metres), search=False).is_whole
