@@ -90,10 +90,10 @@ def select(
             now, reached, data = best.fit.model, best.score, best.training_data
         steps = certain(steps)
         in_time = True
-    accepted = [step.best for step in steps if step.accepted]
-    if accepted:
-        return Selection(model, accepted[-1].fit.model, accepted[-1].score, tuple(steps), data.null, in_time, data)
-    return Selection(model, model, score, tuple(steps), data.null, in_time, data)
+    found = next((step.best for step in reversed(steps) if step.accepted), None)
+    last = (found.fit.model, found.score, found.training_data) if found else (model, score, training_data)
+    now, reached, data = last
+    return Selection(model, now, reached, tuple(steps), data.null, in_time, data)
 
 
 def certain(steps: Sequence[Step]) -> list[Step]:
@@ -115,8 +115,10 @@ def needed(accepted: Sequence[Step]) -> list[Step]:
     for step in accepted[:-1]:
         newest = steps[-1].best
         earlier = replace(newest, effect=newest.fit.model[step.best.name])
+        if is_certain(earlier):
+            continue
         alone = without(earlier)
-        if alone is None or alone.score.cost - newest.score.cost >= LEAST_GAIN or is_certain(earlier):
+        if alone is None or alone.score.cost - newest.score.cost >= LEAST_GAIN:
             continue
         best = refit(alone.model.without(newest.name), replace(newest, effect=alone.model[newest.name]), LATER)
         if best is None:
