@@ -44,6 +44,8 @@ NEAR = 1e-7
 def fit_lag(model: Model, records: Sequence[Record], floors: Sequence[float], fitted: Collection[int]) -> Fit:
     """Joint fit of the hysteresis and of a lag: dead time with one pole, or dead time alone, whichever fits better.
 
+    A pole is between 0 and 1: with a negative one the motion would lead, and ring for ever at the Nyquist frequency.
+
     Parameters
     ----------
     model : Model
@@ -70,7 +72,7 @@ def fit_lag(model: Model, records: Sequence[Record], floors: Sequence[float], fi
         start = Model((model.hysteresis, arx), at, model.voltage_scale, model.displacement_scale)
         fits.append(fit(start, kept, [*loop, *free], floors=sizes, nuisance=Nuisance(offset=True)))
     simplest = min((f for f in fits if len(f.names) == len(loop) + 1), key=lambda f: f.cost)
-    best = min(fits, key=lambda f: f.cost)
+    best = min((f for f in fits if not f.values.get(first, 0.0) > 0.0), key=lambda f: f.cost)
     return simplest if simplest.cost <= 1.01 * best.cost else best
 
 
