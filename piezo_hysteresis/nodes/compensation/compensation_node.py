@@ -73,7 +73,7 @@ class CompensationNode(GuardedNode):
         subscribe(self, "model", self._on_model)
         subscribe(self, "samples", self._on_samples, deep=True, raw=True)
         subscribe(self, "trajectory", self._on_trajectory)
-        subscribe(self, "set_displacement", self._on_set_displacement)
+        subscribe(self, "set_displacement", lambda message: self._move_to(message.data))
         for name, callback in (("plan", self._on_plan), ("learn", self._on_learn), ("stop", self._on_stop)):
             self.create_service(Trigger, f"~/{name}", callback)
         self._actions = JobActions(self, {"track": self._on_goal}, by_service(self._on_stop), ENDED)
@@ -132,7 +132,7 @@ class CompensationNode(GuardedNode):
             self._status.refuse(name[:64], str(error))
             return Trigger.Response(message=str(error))
         self._set_point.leave()
-        self._begin(name, self._runs.follow(name, applied, wanted, limits))
+        self._phase, self._job = name, self._runs.follow(name, applied, wanted, limits)
         return Trigger.Response(success=True)
 
     def _on_goal(self, goal: Any) -> Trigger.Response:
@@ -142,20 +142,21 @@ class CompensationNode(GuardedNode):
         if self._job is None or values_of(status)["state"] != "refused":  # this path was not refused, another one was
             self._actions.report(status)
 
-    def _on_set_displacement(self, message: Float64) -> None:
+    def _move_to(self, target: float) -> None:
+        """Move the stage to a displacement [m] and hold it there."""
         try:
             applied, limits = self._ready(moves=True)
             if not applied.is_ready:
                 raise ModelError("the new model is being run over the applied voltages; send it again in a moment")
-            found = self._runs.planned(applied, np.full(16, float(message.data)), limits, way_back=False)
+            found = self._runs.planned(applied, np.full(16, target), limits, way_back=False)
             if not found.reachability.is_whole:
                 raise StageError(why_not(found))
         except PiezoError as error:
             self._status.refuse("set_displacement", str(error))
             return
         voltage, slope = float(found.voltage[-1]), volts_per_metre(applied.model, limits)
-        self._set_point.go(float(message.data), voltage, slope, limits, in_motion=not applied.is_held)
-        self._status.show("set", f"{1e6 * message.data:.6g} µm by {voltage:.6g} V{doubt(found)}", "set_displacement")
+        self._set_point.go(target, voltage, slope, limits, in_motion=not applied.is_held)
+        self._status.show("set", f"{1e6 * target:.6g} µm by {voltage:.6g} V{doubt(found)}", "set_displacement")
 
     def _ready(self, moves: bool = False) -> tuple[AppliedState, Limits]:
         """The state of the model, and the limits of the driver.
@@ -182,9 +183,6 @@ class CompensationNode(GuardedNode):
         slew = driver.max_slew_rate * (1.0 - 1e-9)  # rounding must not cause a step that the driver refuses
         return self._applied, Limits(driver.voltage_min, driver.voltage_max, slew)
 
-    def _begin(self, phase: str, job: Job) -> None:
-        self._phase, self._job = phase, job
-
     def _tick(self) -> None:
         tracking = self._runs.tracking
         if tracking is not None and (error := tracking.newest_error) is not None:
@@ -192,7 +190,7 @@ class CompensationNode(GuardedNode):
             send(self._rms, Float64(data=tracking.rms or 0.0))
         self._set_point.hold(TICK, self._driver, self._status.lost)
         if self._applied is not None and (target := self._set_point.to_plan_again(self._applied.is_held)) is not None:
-            self._on_set_displacement(Float64(data=target))
+            self._move_to(target)
         if self._job is None:
             return
         try:
@@ -240,7 +238,7 @@ class CompensationNode(GuardedNode):
             response.message = str(error)
             return response
         self._set_point.leave()
-        self._begin(name, self._runs.rounds(name, applied, found, limits))
+        self._phase, self._job = name, self._runs.rounds(name, applied, found, limits)
         response.success, response.message = True, f"{1 + self._values['learning_rounds']} rounds of '{name}' at most"
         return response
 
