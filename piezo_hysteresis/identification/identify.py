@@ -31,38 +31,28 @@ from ..model.model import Model
 from ..model.provenance import provenance, record_errors
 from ..model.sample_periods import identified_periods
 from ..record import Notice, Record
-from .fit.fit import Fit, Progress
-from .fit.form_uncertainty import ADEQUACY, with_form_uncertainty
+from .fit.fit import Progress
+from .fit.form_uncertainty import ADEQUACY
 from .fit.gauge import Gauge
-from .fit.joint import fit_dynamics, fit_joint, fit_lag, without_intersample_error
-from .fit.normal_equations import Nuisance, residuals
+from .fit.normal_equations import residuals
 from .identification import INSEPARABLE, Identification, correlated_pairs, phase_errors, undetermined
 from .identified_range import LAG_ERROR, identified_range
 from .inputs import check_gauge, experiment_of
+from .joint_fits import FitInput, fit_broadband, fit_loops, fit_structured
 from .one_core import on_one_core
 from .published_steps import delay_of_steps, published_steps
-from .records.conditioning import records_to_fit
 from .records.conditioning_split import known_from_within
 from .records.excitation_check import one_way
-from .records.leading_step import Blocks, steps_apart
-from .records.noise import sensor_noise, without_voltage_noise
+from .records.noise import without_voltage_noise
 from .records.one_axis import one_axis
 from .records.roles import HELD_OUT, roles_of
-from .steps.comparison import InputComparison, compare_inputs
-from .steps.dynamics import Dynamics, delay_of
-from .steps.hysteresis_choice import choose_memory
-from .steps.linear_start import hysteresis_signals
-from .steps.order_choice import OrderError, choose_order, compare_orders
-from .steps.remaining_lag import lag, lag_notices
+from .steps.remaining_lag import lag
 from .steps.three_steps import behind_the_gauge
-from .structure.structure_choice import StructureChoice, choose_structure
 
 AT_THE_FLOOR = 1.5
 """Mean square of residual over floor below which a fit counts as converged, independent of its last step."""
 FEWEST_SAMPLES = 32
 """Number of samples of the shortest record that can show a loop."""
-HIGHEST_ORDER = 10
-"""Highest model order of the comparison."""
 
 
 @on_one_core
@@ -157,89 +147,28 @@ def identify(
     dead = 1.0 if delay is None else max(1.0, delay.time / period)
     frame = Model((hysteresis(), Arx(a=(), b=(gauge.gain,), delay=dead)), period, scale_v, scale_y)
     start = behind_the_gauge(frame, published, records, roles.loops)
-    dynamics: Dynamics | None = None
-    table: tuple[OrderError, ...] = ()
-    comparisons: tuple[InputComparison, ...] = ()
-    structure: StructureChoice | None = None
-    used: Blocks = records, floors, roles.fitted
+    inputs = FitInput(start, records, floors, roles, reach, report)
     if roles.broadband:
-        report("step 2: dynamics", 0.2)
-        signals = hysteresis_signals(start, records, roles.broadband)
-        samples = delay_of(signals) if delay is None else round(dead)
-        table = compare_orders(signals, samples, period, HIGHEST_ORDER)
-        chosen = orders or (choose_order(table),) * 2
-
-        def joint_progress(word: str, part: float) -> None:
-            report(word, 0.3 + 0.6 * part)
-
-        def fit_behind(model: Model, samples: int) -> tuple[Fit, Dynamics, tuple[Notice, ...]]:
-            return fit_dynamics(model, records, floors, roles.fitted, roles.broadband, samples, chosen, joint_progress)
-
-        joint, dynamics, more_notices = fit_behind(start, samples)
-        if delay is None:
-            # a better hysteresis gives a more accurate onset
-            again = delay_of(hysteresis_signals(joint.model, records, roles.broadband))
-            if again != samples:
-                samples = again
-                joint, dynamics, more_notices = fit_behind(joint.model, samples)
-            notices.append(
-                Notice(
-                    "delay_from_fit",
-                    f"no step was recorded; the delay of {counted(samples, 'sample')} was taken from the dynamics",
-                )
-            )
-        notices += more_notices
-        corrected, more_notices = without_intersample_error(joint.model, records, floors, roles.fitted)
-        notices += more_notices
-        if corrected is not records:
-            records, joint = corrected, fit_joint(joint.model, corrected, floors, roles.fitted)
-        used = records, floors, roles.fitted
-        noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
-        comparisons, more_notices = compare_inputs(joint.model, records, noise, samples, chosen)
-        notices += more_notices
+        found = fit_broadband(inputs, None if delay is None else round(dead), orders, memory)
+    elif memory and start.hysteresis.memoryless() is not None:
+        found = fit_structured(inputs, natural, gauge)
     else:
-        chooses = memory and start.hysteresis.memoryless() is not None
-        if not chooses or any(r.sample_period > 1.001 * period for r in records):
-            report("joint fit", 0.2)
-            used = steps_apart(records, floors, roles.fitted)
-            joint = fit_lag(start, *used)
-            corrected, more_notices = without_intersample_error(joint.model, records, floors, roles.fitted)
-            notices += more_notices
-            if corrected is not records:
-                records, used = corrected, steps_apart(corrected, floors, roles.fitted)
-                joint = joint if chooses else fit_lag(joint.model, *used)
-        if chooses:
-            gauge.require_sign(natural)
-            quiet = [max(noise, ADEQUACY * reach) for noise in sensor_noise(records)]
-            choice = choose_structure(
-                natural.of_model(start), records, quiet, roles.fitted, lambda word, part: report(word, 0.2 + 0.7 * part)
-            )
-            joint = gauge.of_fit(choice.fit)
-            structure = replace(choice, fit=joint)
-            notices += choice.notices
-    if memory and roles.broadband:
-        report("memory of the hysteresis", 0.9)
-        joint, more_notices = choose_memory(joint, records, floors, roles.fitted, roles.loops)
-        notices += more_notices
-    if structure is None:
-        kept, sizes = records_to_fit(*used)
-        joint = with_form_uncertainty(joint, kept, Nuisance(offset=True), sizes, sizes, reach)
-    if not roles.broadband:
-        notices += lag_notices(joint, [roles.contents[i] for i in roles.fitted], rivals_counted=structure is not None)
+        found = fit_loops(inputs)
+    notices += found.notices
     report("free run", 0.95)
-    phases = phase_errors(joint.model, experiment, roles)
-    zero = float(np.mean([e.mean() for e in residuals(joint.model, records)]))
-    joint = replace(joint, model=joint.model.with_effect(Offset(y0=zero)))
+    phases = phase_errors(found.fit.model, experiment, roles)
+    zero = float(np.mean([e.mean() for e in residuals(found.fit.model, found.records)]))
+    joint = replace(found.fit, model=found.fit.model.with_effect(Offset(y0=zero)))
     joint = replace(joint, converged=joint.converged or joint.cost <= AT_THE_FLOOR)
     if not joint.converged:
         notices.append(Notice("not_converged", f"the joint fit did not converge in {joint.iterations} linearisations"))
     notices += [Notice("at_bound", f"{name} reached a bound of its range") for name in undetermined(joint)]
-    if structure is None:
+    if found.structure is None:
         notices += [
             Notice("not_identifiable", f"{a} and {b} are not determined separately; record whole loops", severe=True)
             for a, b, _ in correlated_pairs(joint, INSEPARABLE)
         ]
-    notices += one_way(records, roles.fitted)
+    notices += one_way(found.records, roles.fitted)
     unseen = not all(p.is_fitted for p in phases)
     if not unseen:
         notices.append(
@@ -248,13 +177,22 @@ def identify(
                 "no phase was left out, so the errors are not prediction errors; leave one out with --held-out",
             )
         )
-    found = Identification(
-        joint.model, joint, delay, dynamics, published, table, comparisons, phases, tuple(notices), structure
+    result = Identification(
+        joint.model,
+        joint,
+        delay,
+        found.dynamics,
+        published,
+        found.orders,
+        found.comparisons,
+        phases,
+        tuple(notices),
+        found.structure,
     )
-    origin = provenance(experiment, found.free_run_error, found.free_run_percent)
-    errors = record_errors(max(p.rms for p in phases), found.moving_error, unseen)
-    origin = {**origin, **errors, **identified_range(records, roles.fitted)}
+    origin = provenance(experiment, result.free_run_error, result.free_run_percent)
+    errors = record_errors(max(p.rms for p in phases), result.moving_error, unseen)
+    origin = {**origin, **errors, **identified_range(found.records, roles.fitted)}
     if not roles.broadband:
-        origin |= identified_periods(records[i].sample_period for i in roles.fitted)
+        origin |= identified_periods(found.records[i].sample_period for i in roles.fitted)
         origin |= {LAG_ERROR: f"{1.96 * lag(joint)[1]:.4g}"}
-    return replace(found, model=replace(joint.stated_model, provenance=origin))
+    return replace(result, model=replace(joint.stated_model, provenance=origin))

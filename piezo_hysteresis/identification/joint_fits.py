@@ -1,0 +1,207 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The joint fits in free run that an experiment permits, with broadband records or with loops alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..errors import counted
+from ..model.model import Model
+from ..record import Notice, Record
+from .fit.fit import Fit, Progress
+from .fit.form_uncertainty import ADEQUACY, with_form_uncertainty
+from .fit.gauge import Gauge
+from .fit.joint import fit_dynamics, fit_joint, fit_lag, without_intersample_error
+from .fit.normal_equations import Nuisance
+from .records.conditioning import records_to_fit
+from .records.leading_step import Blocks, steps_apart
+from .records.noise import sensor_noise
+from .records.roles import Roles
+from .steps.comparison import InputComparison, compare_inputs
+from .steps.dynamics import Dynamics, delay_of
+from .steps.hysteresis_choice import choose_memory
+from .steps.linear_start import hysteresis_signals
+from .steps.order_choice import OrderError, choose_order, compare_orders
+from .steps.remaining_lag import lag_notices
+from .structure.structure_choice import StructureChoice, choose_structure
+
+HIGHEST_ORDER = 10
+"""Highest model order of the comparison."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FitInput:
+    """What every joint fit starts from.
+
+    Parameters
+    ----------
+    start : Model
+        Model with a hysteresis fitted to the loops, and the delay that is known or one sample.
+    records : tuple of Record
+        The experiment, in order.
+    floors : sequence of float
+        Floor of every record [m].
+    roles : Roles
+        What each record is used for.
+    reach : float
+        Largest range of the displacement of a record [m].
+    report : callable
+        Called with the name of the step and the fraction done.
+    """
+
+    start: Model
+    records: tuple[Record, ...]
+    floors: Sequence[float]
+    roles: Roles
+    reach: float
+    report: Progress
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class JointFit:
+    """Result of a joint fit.
+
+    Parameters
+    ----------
+    fit : Fit
+        The fit, with intervals that contain the uncertainty of the model's form.
+    records : tuple of Record
+        The records without the inter-sample error of averages.
+    notices : tuple of Notice
+        Findings, in order.
+    dynamics : Dynamics or None
+        The linear dynamics that were estimated from broadband records.
+    orders : tuple of OrderError
+        Comparison of model orders.
+    comparisons : tuple of InputComparison
+        Comparison of the inputs of the ARX model.
+    structure : StructureChoice or None
+        The choice of the structure, if it was made.
+    """
+
+    fit: Fit
+    records: tuple[Record, ...]
+    notices: tuple[Notice, ...]
+    dynamics: Dynamics | None = None
+    orders: tuple[OrderError, ...] = ()
+    comparisons: tuple[InputComparison, ...] = ()
+    structure: StructureChoice | None = None
+
+
+def fit_broadband(given: FitInput, delay: int | None, orders: tuple[int, int] | None, memory: bool) -> JointFit:
+    """Fit hysteresis and ARX dynamics, which broadband records determine.
+
+    Parameters
+    ----------
+    given : FitInput
+        Start, records and floors.
+    delay : int or None
+        Delay in the response to a step, samples; None takes it from the dynamics.
+    orders : (int, int) or None
+        na and nb; None chooses them.
+    memory : bool
+        Whether plays are compared with the state of the operator.
+    """
+    start, records, floors, roles = given.start, given.records, given.floors, given.roles
+    given.report("step 2: dynamics", 0.2)
+    signals = hysteresis_signals(start, records, roles.broadband)
+    samples = delay_of(signals) if delay is None else delay
+    table = compare_orders(signals, samples, start.sample_period, HIGHEST_ORDER)
+    chosen = orders or (choose_order(table),) * 2
+
+    def fit_behind(model: Model, samples: int) -> tuple[Fit, Dynamics, tuple[Notice, ...]]:
+        def report(word: str, part: float) -> None:
+            given.report(word, 0.3 + 0.6 * part)
+
+        return fit_dynamics(model, records, floors, roles.fitted, roles.broadband, samples, chosen, report)
+
+    fit, dynamics, of_dynamics = fit_behind(start, samples)
+    notices = list[Notice]()
+    if delay is None:
+        # a better hysteresis gives a more accurate onset
+        again = delay_of(hysteresis_signals(fit.model, records, roles.broadband))
+        if again != samples:
+            samples = again
+            fit, dynamics, of_dynamics = fit_behind(fit.model, samples)
+        message = f"no step was recorded; the delay of {counted(samples, 'sample')} was taken from the dynamics"
+        notices.append(Notice("delay_from_fit", message))
+    corrected, of_averages = without_intersample_error(fit.model, records, floors, roles.fitted)
+    if corrected is not records:
+        fit = fit_joint(fit.model, corrected, floors, roles.fitted)
+    noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
+    comparisons, of_inputs = compare_inputs(fit.model, corrected, noise, samples, chosen)
+    notices += [*of_dynamics, *of_averages, *of_inputs]
+    if memory:
+        given.report("memory of the hysteresis", 0.9)
+        fit, of_memory = choose_memory(fit, corrected, floors, roles.fitted, roles.loops)
+        notices += of_memory
+    fit = _with_form(fit, (corrected, floors, roles.fitted), given.reach)
+    return JointFit(fit, corrected, tuple(notices), dynamics, table, comparisons)
+
+
+def fit_structured(given: FitInput, natural: Gauge, gauge: Gauge) -> JointFit:
+    """Choose the structure without broadband records, and fit it; `fit.model` has the gauge that was asked for.
+
+    Parameters
+    ----------
+    given : FitInput
+        Start, records and floors.
+    natural, gauge : Gauge
+        Natural gauge of the records, in which the structure is chosen, and that of the result.
+
+    Raises
+    ------
+    ParameterError
+        If G(1) of the gauge has the wrong sign for plays.
+    """
+    gauge.require_sign(natural)
+    start, records, roles = given.start, given.records, given.roles
+    notices: tuple[Notice, ...] = ()
+    if any(r.sample_period > 1.001 * start.sample_period for r in records):
+        given.report("joint fit", 0.2)
+        rough = fit_lag(start, *steps_apart(records, given.floors, roles.fitted))
+        records, notices = without_intersample_error(rough.model, records, given.floors, roles.fitted)
+    quiet = [max(noise, ADEQUACY * given.reach) for noise in sensor_noise(records)]
+
+    def report(word: str, part: float) -> None:
+        given.report(word, 0.2 + 0.7 * part)
+
+    choice = choose_structure(natural.of_model(start), records, quiet, roles.fitted, report)
+    fit = gauge.of_fit(choice.fit)
+    of_lag = lag_notices(fit, [roles.contents[i] for i in roles.fitted], rivals_counted=True)
+    return JointFit(fit, records, (*notices, *choice.notices, *of_lag), structure=replace(choice, fit=fit))
+
+
+def fit_loops(given: FitInput) -> JointFit:
+    """Fit the hysteresis and a lag, which is all that loops determine."""
+    records, floors, roles = given.records, given.floors, given.roles
+    given.report("joint fit", 0.2)
+    used = steps_apart(records, floors, roles.fitted)
+    fit = fit_lag(given.start, *used)
+    corrected, notices = without_intersample_error(fit.model, records, floors, roles.fitted)
+    if corrected is not records:
+        used = steps_apart(corrected, floors, roles.fitted)
+        fit = fit_lag(fit.model, *used)
+    fit = _with_form(fit, used, given.reach)
+    of_lag = lag_notices(fit, [roles.contents[i] for i in roles.fitted], rivals_counted=False)
+    return JointFit(fit, corrected, (*notices, *of_lag))
+
+
+def _with_form(fit: Fit, used: Blocks, reach: float) -> Fit:
+    """The fit with the uncertainty of the model's form in its covariance."""
+    kept, sizes = records_to_fit(*used)
+    return with_form_uncertainty(fit, kept, Nuisance(offset=True), sizes, sizes, reach)
