@@ -68,10 +68,13 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
     Raises
     ------
     ModelError
-        If the name is not a lower-case C identifier, an effect has no C form, or the inverse is that of another model.
+        If the name is not a lower-case C identifier or is that of a header of C, an effect has no C form, or the
+        inverse is that of another model.
     """
     if not NAME.fullmatch(name):
         raise ModelError(f"name: got {name!r}, expected lower-case letters, digits and '_', a letter first")
+    if name in _library_headers():
+        raise ModelError(f"name: got {name!r}, expected no header of C: {name}.h would hide it")
     if inverse is not None and model_hash(inverse.model) != model_hash(model):
         raise ModelError("inverse: got that of another model, expected that of the model to export")
     found = prediction(model)
@@ -109,6 +112,13 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
         values["library"] = c_text.library({**found.forms, **turned.forms})
     files = {f"{name}.h": "header.h.jinja", f"{name}.c": "source.c.jinja", f"{name}_test.c": "self_test.c.jinja"}
     return {file: templates().get_template(source).render(values) for file, source in files.items()}
+
+
+def _library_headers() -> set[str]:
+    """Headers of the C library that the files include."""
+    here = templates()
+    sources = (here.loader.get_source(here, file)[0] for file in here.list_templates() if here.loader is not None)
+    return {header for source in sources for header in re.findall(r"#include <(\w+)\.h>", source)}
 
 
 def model_hash(model: Model) -> str:

@@ -119,7 +119,7 @@ def read(
     RecordError
         If the samples do not form a record.
     """
-    if not paths:
+    if not paths or "" in paths:
         raise RecordingError("read: got no path, expected a recording")
     options = ReadOptions(
         axis, columns or {}, units or {}, sample_period, initial_voltage, rows, phases, include, average

@@ -196,6 +196,13 @@ def test_the_inverse_of_another_model_is_refused():
         c_program(MODEL, inverse=Inverse(MODEL.with_values({"bouc_wen.A": 0.5})))
 
 
+@pytest.mark.parametrize("name", ["math", "string", "stdint"])
+def test_a_name_that_hides_a_header_of_c_is_refused(name):
+    """math.c included itself, and did not compile."""
+    with pytest.raises(ModelError, match=f"{name}.h would hide it"):
+        c_program(MODEL, name)
+
+
 @pytest.mark.parametrize("name", ["", "2x", "Stage", "a-b", "x/y", "é"])
 def test_a_name_that_c_does_not_allow_is_refused(name):
     with pytest.raises(ModelError, match="expected lower-case letters"):

@@ -183,6 +183,11 @@ def test_compressed_bags_are_still_read(tmp_path):
         np.testing.assert_array_equal(record.voltage, experiment()[0].voltage)
 
 
+def test_an_empty_path_is_none(tmp_path):
+    """The present folder was read: a shell variable that was not set named any recording in it."""
+    assert "got no path" in refused("import", "", "-o", str(tmp_path / "experiment"))
+
+
 @pytest.mark.parametrize(
     "name", ["bag.mcap", "bag.db3", "table.csv", "x.npz", "x.mat", "x.dat", "x", "x.tdms", "x.npy"]
 )
