@@ -29,6 +29,9 @@ from .table import Table
 ALIKE = 0.95
 """Correlation from which two parameters are hard to distinguish."""
 
+MOST_PAIRS = 12
+"""Largest number of correlations in the table."""
+
 MOST_SHOWN = 4
 """Largest number of array elements in the table; the model file contains all."""
 
@@ -102,10 +105,13 @@ def correlation_table(fit: Fit) -> Table | None:
     strong = sorted((p for p in pairs if abs(p[2]) > ALIKE), key=lambda p: -abs(p[2]))
     if not strong:
         return None
+    note = "The data determine a combination of the two better than each alone."
+    if len(strong) > MOST_PAIRS:
+        note += f" These are the {MOST_PAIRS} strongest of {len(strong)}."
     return Table(
         f"Correlations above {ALIKE:g}",
         ("one", "other", "correlation"),
-        tuple((a, b, f"{c:+.3f}") for a, b, c in strong),
-        "The data determine a combination of the two better than each alone.",
+        tuple((a, b, f"{c:+.3f}") for a, b, c in strong[:MOST_PAIRS]),
+        note,
         frozenset({2}),
     )

@@ -69,6 +69,15 @@ def test_parameters_show_intervals_bounds_hit_and_correlations(models):
     assert correlation_table(fitted(model, names, np.diag(np.diag(covariance)))) is None
 
 
+def test_of_many_correlations_the_strongest_are_shown():
+    """A fit of plays to one step printed a hundred rows."""
+    model = Model((BoucWen(), HysteresisMemory(c=(0.02,) * 16)), 1e-3)
+    names = [f"hysteresis_memory.c[{k}]" for k in range(16)]
+    table = correlation_table(fitted(model, names, 1e-6 * (np.full((16, 16), 0.97) + 0.03 * np.eye(16))))
+    assert len(table.rows) == 12
+    assert "the 12 strongest of 120" in table.note
+
+
 def test_a_number_is_shown_as_exactly_as_its_interval(models):
     """A mode at 236.654 Hz that is known within 0.025 Hz was shown as 236.7 ± 0.025 Hz."""
     model = models["with creep"].with_values({"bouc_wen.p2": 0.8765432})
