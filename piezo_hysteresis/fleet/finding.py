@@ -28,9 +28,8 @@ from ..errors import PiezoError, RecordingError, printable
 from .source import NamePattern, Source, changed_at, version_of
 from .storage import Storage
 
-ENDINGS = frozenset(
-    (".csv", ".txt", ".tsv", ".dat", ".mat", ".npz", ".npy", ".h5", ".hdf5", ".hdf", ".tdms", ".mcap", ".db3")
-)
+_TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm")
+ENDINGS = frozenset((*_TABLES, ".mat", ".npz", ".npy", ".h5", ".hdf5", ".hdf", ".tdms", ".mcap", ".db3"))
 """Endings of files that count as recordings in a folder or pattern."""
 _BAG = frozenset((".mcap", ".db3", ".zstd"))
 """Endings of the files of a bag."""

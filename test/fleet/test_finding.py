@@ -58,6 +58,13 @@ def test_a_folder_gives_every_recording_in_it_once(lab):
     assert len({s.version for s in found.values()}) == 4
 
 
+@pytest.mark.parametrize("ending", ["asc", "lvm", "tdms"])
+def test_what_instruments_write_is_found_in_a_folder(tmp_path, ending):
+    """Tables of LabVIEW were read if they were named, and passed over in a folder."""
+    (tmp_path / f"run.{ending}").write_text("0 0\n")
+    assert [s.url for s in find_recordings([str(tmp_path)])] == [f"{tmp_path}/run.{ending}"]
+
+
 def test_patterns(lab):
     assert [s.url for s in find_recordings([f"{lab}/stage_?/2026*"])] == [
         f"{lab}/stage_a/2026-11-03", f"{lab}/stage_b/2026-10-05.NPZ", f"{lab}/stage_b/20261104T1530.csv",

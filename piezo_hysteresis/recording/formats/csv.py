@@ -34,7 +34,7 @@ from ..table.text_cells import Cells, read_cells
 from ..table.time_column import TimeColumn
 from ..whole_file import whole_file
 
-_ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc")
+_ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm")
 """Ends of the names of text tables."""
 _ROWS = 1 << 15
 """Number of rows that are written together."""
