@@ -59,6 +59,8 @@ class Record(Pictured):
     channels : mapping of str to (n,) array_like, optional
         What else was measured, e.g. ``other_displacement`` of the coupled axis [m], ``displacement_3``,
         ``monitor_voltage`` [V], ``temperature`` of the stage [K]; the names are those of `ChannelMapping`.
+    voltage_noise : float
+        Standard deviation of the noise in the voltage, as far as it was estimated [V]; files do not contain it.
 
     Raises
     ------
@@ -81,6 +83,7 @@ class Record(Pictured):
     truncated: bool = False
     initial_voltage: float | None = None
     channels: Mapping[str, Samples] = field(default_factory=ChannelMapping)
+    voltage_noise: float = 0.0
 
     def __post_init__(self) -> None:
         put = object.__setattr__

@@ -22,7 +22,7 @@ from dataclasses import replace
 
 from ..errors import DivergenceError
 from ..identification.fit.fit import Fit
-from ..identification.fit.form_uncertainty import with_form_uncertainty
+from ..identification.fit.form_uncertainty import with_alternative, with_form_uncertainty
 from ..identification.fit.time_limit import ending_at
 from ..identification.records.excitation_check import missing_excitation
 from ..identification.records.noise_floor import ADEQUATE
@@ -143,6 +143,8 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
             gap = gap_of(first.model, first.model, tested)
     free = whole.free_with(final.model)
     final = with_form_uncertainty(final, whole.records, free, whole.floors, noise, setup.span)
+    if falls and (other := selection.alternative) is not None:
+        final = with_alternative(final, selection.accepted[-1].best.fit, other.fit)
     state.progress("next experiment", 0.95)
     if diverges:
         said = Conclusion.INSUFFICIENT_DATA, DIVERGES

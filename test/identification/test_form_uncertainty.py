@@ -19,9 +19,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from piezo_hysteresis.effects import AmplifierBandwidth, AmplifierSlewLimit, Arx, BoucWen, Offset
+from piezo_hysteresis.effects import AmplifierBandwidth, AmplifierSlewLimit, Arx, BoucWen, Creep, Offset
 from piezo_hysteresis.identification.fit.fit import fit
-from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY, PIECES, slope_spread, with_form_uncertainty
+from piezo_hysteresis.identification.fit.form_uncertainty import (
+    ADEQUACY,
+    PIECES,
+    slope_spread,
+    with_alternative,
+    with_form_uncertainty,
+)
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.model.model import Model
@@ -51,6 +57,18 @@ def test_the_form_uncertainty_does_not_depend_on_the_length_of_the_record(size):
     alone, wider = errors_of(size)
     expected = ADEQUACY * SPAN / np.sqrt(PIECES) / (1e-5 / np.sqrt(2.0))
     assert np.sqrt(wider**2 - alone**2) == pytest.approx(expected, rel=0.05)
+
+
+def test_an_effect_that_may_be_there_moves_the_ends_of_the_intervals():
+    rng, u = np.random.default_rng(3), np.sin(2 * np.pi * 5 * np.arange(1000) / 1000)
+    (y,) = MODEL.with_effect(Creep(gamma=0.02)).simulate(Record(u, np.zeros(1000), 1e-3))
+    records, names = (Record(u, y + 1e-9 * rng.normal(size=1000), 1e-3),), ["bouc_wen.p2"]
+    alone = fit(MODEL, records, names, floors=[1e-9])
+    beside = fit(MODEL.with_effect(Creep(gamma=0.01)), records, [*names, "creep.gamma"], floors=[1e-9])
+    low, high = with_alternative(alone, alone, beside).interval("bouc_wen.p2")
+    assert low < beside.values["bouc_wen.p2"] < high
+    narrow_low, narrow_high = alone.interval("bouc_wen.p2")
+    assert not narrow_low < beside.values["bouc_wen.p2"] < narrow_high
 
 
 def test_a_visible_misfit_counts_with_its_size():

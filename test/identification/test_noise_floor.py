@@ -14,6 +14,8 @@
 
 """The floor: noise of known size is found at every sample period, and nothing else is taken for noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy
@@ -52,6 +54,15 @@ def test_white_noise_is_found_under_motion_a_thousand_times_larger(frequency, pe
 @pytest.mark.parametrize("frequency", [100.0, 250.0])
 def test_scatter_between_periods_is_the_noise(frequency):
     assert period_scatter(sine(frequency, 2e-5, 0.4)) == pytest.approx(SIGMA, rel=0.03)
+
+
+def test_the_noise_that_is_left_in_a_measured_voltage_adds_to_the_floor():
+    """The stage gives 4 µm/V over a drive of 1 to 6 V, and the floors of commanded voltages stay."""
+    records = [sine(100.0, 2e-5, 0.4), sine(100.0, 2e-5, 0.4)]
+    commanded = noise_floors(records)
+    measured = noise_floors([records[0], replace(records[1], voltage_noise=5e-3)])
+    assert measured[0] == commanded[0]
+    assert measured[1] == pytest.approx(np.hypot(commanded[1], 4e-6 * 5e-3), rel=0.01)
 
 
 def test_scatter_includes_noise_below_the_top_of_the_spectrum():

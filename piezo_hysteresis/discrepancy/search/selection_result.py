@@ -22,6 +22,7 @@ import numpy as np
 
 from ...identification.fit.cross_validation import Score
 from ...model.model import Model
+from .candidate_refits import LEAST_GAIN
 from .candidates import Candidate, FittedCandidate
 from .training_data import TrainingData
 
@@ -111,6 +112,14 @@ class Selection:
     def accepted(self) -> tuple[Step, ...]:
         """The steps that added an effect."""
         return tuple(s for s in self.steps if s.accepted)
+
+    @property
+    def alternative(self) -> FittedCandidate | None:
+        """The refit with one more effect, which improves the prediction enough but may be absent; None without one."""
+        last = self.steps[-1] if self.steps else None
+        if last is None or last.accepted or last.before.cost - last.best.score.cost < LEAST_GAIN:
+            return None
+        return last.best
 
     def explained(self, score: Score) -> float:
         """Share X of the gap of the baseline that is explained at a score, 0 to 1; the worst record is ignored."""

@@ -28,6 +28,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...effects import Arx
 from ...effects.effect import ChainPosition
 from ...record import Record
 from .bounded_step import gauge
@@ -101,6 +102,23 @@ def with_form_uncertainty(
         if unit == "V/s" and np.isfinite(spread := min(slope_spread(r, value) for r in fitted)):
             covariance[at, at] += spread**2
     return replace(fit, covariance=covariance)
+
+
+def with_alternative(fit: Fit, chosen: Fit, other: Fit) -> Fit:
+    """The fit with the difference between two fits in its covariance, of which the data do not exclude the other.
+
+    Parameters
+    ----------
+    fit : Fit
+        Fit of the form of `chosen`.
+    chosen, other : Fit
+        Fits of both forms to the same records. Coefficients of the dynamics, which are no sizes by themselves, are left
+        out.
+    """
+    ours, theirs = chosen.values, other.values
+    compared = [n in ours and n in theirs and not n.startswith(f"{Arx.name}.") for n in fit.names]
+    off = np.array([theirs[n] - ours[n] if known else 0.0 for n, known in zip(fit.names, compared, strict=True)])
+    return replace(fit, covariance=fit.covariance + np.outer(off, off))
 
 
 def slope_spread(record: Record, slope: float) -> float:

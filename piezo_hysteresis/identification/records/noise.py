@@ -40,7 +40,7 @@ WINDOWS = (5, 7, 9, 11, 13, 17, 25, 33, 49, 65, 97, 129, 193, 257)
 """Numbers of samples over which a noisy voltage may be smoothed."""
 WIDTH = 0.5
 """Half width of the plays that take away its turns, in standard deviations of the noise."""
-AGREE = 1.5
+AGREE = 2.5
 """Standard deviations within which the smooth voltages of two windows agree."""
 VOLTAGE_NOISE = "voltage_noise"
 """Kind of the notice about a voltage that was measured with noise."""
@@ -126,28 +126,43 @@ def quieted(record: Record, noise: float) -> Record:
     """
     if noise == 0.0:
         return record
-    smooth = _smooth(np.array(record.voltage), noise)
+    measured = np.array(record.voltage)
+    smooth, share = _smooth(measured, noise)
     forward, backward = np.empty(smooth.size), np.empty(smooth.size)
     for drive, followed in ((smooth, forward), (smooth[::-1].copy(), backward)):
         play_positions(drive, WIDTH * noise, drive[0], followed)
-    return replace(record, voltage=0.5 * (forward + backward[::-1]))
+    quiet = 0.5 * (forward + backward[::-1])
+    # Stein's unbiased estimate of the squared error: a fast random drive is not smooth, and is left as it was measured
+    error = (quiet - measured) ** 2 + (2.0 * share - 1.0) * noise**2
+    near = np.minimum(scipy.ndimage.uniform_filter1d(error, WINDOWS[-1], mode="mirror"), noise**2)
+    voltage = np.where(near < noise**2, quiet, measured)
+    return replace(record, voltage=voltage, voltage_noise=math.sqrt(max(0.0, float(near.mean()))))
 
 
-def _smooth(values: Samples, noise: float) -> Samples:
+def _smooth(values: Samples, noise: float) -> tuple[Samples, Samples]:
     """Cubics through a window around every sample, as long as those through all shorter windows agree with them.
 
     Two estimates agree if they differ by less than `AGREE` times the sum of their standard deviations, so that steps,
     sharp turns and fast waves stay (Goldenshluger & Nemirovski, Math. Methods Statist. 6 (1997) 135).
+
+    Returns
+    -------
+    found : (n,) ndarray
+        Smooth values.
+    share : (n,) ndarray
+        Share of the variance of the noise that is left in them.
     """
-    found, low, high = values, values - AGREE * noise, values + AGREE * noise
+    found, left = values, np.ones(values.size)
+    low, high = values - AGREE * noise, values + AGREE * noise
     for window in WINDOWS:
         if window > values.size:
             break
-        fit = scipy.signal.savgol_filter(values, window, 3)
-        error = AGREE * noise * float(np.linalg.norm(scipy.signal.savgol_coeffs(window, 3)))
+        fit = scipy.signal.savgol_filter(values, window, 3, mode="mirror")
+        share = float(np.sum(scipy.signal.savgol_coeffs(window, 3) ** 2))
+        error = AGREE * noise * math.sqrt(share)
         low, high = np.maximum(low, fit - error), np.minimum(high, fit + error)
-        found = np.where(low <= high, fit, found)
-    return found
+        found, left = np.where(low <= high, fit, found), np.where(low <= high, share, left)
+    return found, left
 
 
 def without_voltage_noise(experiment: Experiment) -> tuple[Experiment, tuple[Notice, ...]]:

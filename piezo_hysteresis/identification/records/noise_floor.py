@@ -16,7 +16,8 @@
 
 It is the largest of four values: white noise from the top of the spectrum, where a stage does not move; the scatter
 between periods of a periodic record, which includes jitter and 1/f noise; the resolution of the converter, q/√12; and
-an adequacy floor of 0.03 % of the range, below which a model is good enough for any laboratory.
+an adequacy floor of 0.03 % of the range, below which a model is good enough for any laboratory. If the voltage was
+measured, the model follows its noise, which the stage has not seen: times the gain of the stage, this adds to the noise.
 """
 
 from __future__ import annotations
@@ -176,6 +177,13 @@ def noise_floors(records: Sequence[Record]) -> Array:
     Scatter between periods is the sum of white noise, slower noise in proportion to it, and jitter of the clock in
     proportion to the speed. Records without periods use the estimates of the periodic ones.
     """
+    drive = max(float(np.ptp(np.append(r.voltage, r.settled_voltage))) for r in records)
+    followed = np.array([r.voltage_noise for r in records]) * (stroke(records) / drive if drive > 0.0 else 0.0)
+    return np.hypot(_sensor_noise(records), followed)
+
+
+def _sensor_noise(records: Sequence[Record]) -> Array:
+    """Noise of the displacement of every record [m], shape (r,)."""
     white = np.array([max(white_noise(r), quantum(r) / np.sqrt(12.0)) for r in records])
     speed = np.array([_speed(r, w) for r, w in zip(records, white, strict=True)])
     scatter = np.array([np.nan if (s := period_scatter(r)) is None else s for r in records])
