@@ -138,6 +138,8 @@ class IdentificationNode(GuardedNode):
             where = f"in {self._folder.root}" if path is None else str(path)
             response.message = f"no experiment {where}; set 'experiment', or identify first"
             return response
+        if self._job is None:
+            self._status.likely = ""
         return self._begin(response, self._fit(diagnosis, path), f"diagnosing {path}")
 
     def _on_abort(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

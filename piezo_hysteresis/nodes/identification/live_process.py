@@ -62,7 +62,7 @@ class Due:
     name : str
         Short description of the phases.
     phases : tuple of ProtocolPhase
-        Phases to be played.
+        Phases to be played; empty at the end.
     likely : str
         The likeliest explanations with their probabilities; empty before the first phases.
     """
@@ -102,6 +102,7 @@ def _decide(exchange: Exchange, path: Path, limits: DriveLimits, settings: LiveS
         count, last = exchange.receive()
         phases += count
         live = live.advanced(_recorded(path, phases, last, exchange.report), exchange.report)
+    exchange.send(Due(live.due_name, live.due, live.updates[-1].sentence()))
     return _outcome(live, path)
 
 

@@ -63,15 +63,17 @@ class LiveProtocols:
             self._averaged |= {phase.name: phase.stored_every for phase in self._last}
             save_decimation(self._path, self._averaged)
             self._process.played(self._last.phases)
-        while (answer := self._process.poll()) is None:
-            yield Progress("deciding", *self._process.progress)
-        if isinstance(answer, Outcome):
-            self._found = answer
-            return None
-        if answer.likely:
-            self._inform(answer.likely)
-        self._last = Protocol(answer.name, limits, answer.phases)
-        return self._last
+        while not isinstance(answer := self._process.poll(), Outcome):
+            if answer is None:
+                yield Progress("deciding", *self._process.progress)
+                continue
+            if answer.likely:
+                self._inform(answer.likely)
+            if answer.phases:
+                self._last = Protocol(answer.name, limits, answer.phases)
+                return self._last
+        self._found = answer
+        return None
 
     def close(self) -> None:
         """End the process at once."""

@@ -16,9 +16,12 @@
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
+from piezo_hysteresis.discrepancy.choice.update import percent
 from piezo_hysteresis.nodes.messages.conversions import values_of
 from piezo_hysteresis.nodes.runtime.qos import LATCHED
 from piezo_hysteresis.recording import read
@@ -60,13 +63,19 @@ def test_a_stage_is_driven_until_the_answer_is_certain(lab):
     assert node.ask("diagnose").success
     status = node.reaches("done", "failed", timeout=PATIENCE)
     assert values_of(status)["state"] == "done", status.message
-    assert "mains_hum" in values_of(status)["likely"] or "mains hum" in status.message
+    assert values_of(status)["likely"].startswith("mains_hum ")
     (folder,) = node.runs.iterdir()
     answer = read_json(folder / "answer.json")
+    named, share = next(iter(answer["live"]["probabilities"][-1]["probabilities"].items()))
+    assert values_of(status)["likely"].startswith(f"{named} {percent(share)}"), "of the last decision"
     assert [e["name"] for e in answer["effects"]] == ["mains_hum"]
     played = sum(r.duration for r in read(folder).records)
     assert played == pytest.approx(answer["live"]["stage_time_s"], rel=0.02)
     assert (folder / "diagnosis.yaml").exists()
+    off = Parameter(name="live", value=ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=False))
+    lab.call(SetParameters, f"{NODE}/set_parameters", SetParameters.Request(parameters=[off]))
+    assert node.ask("diagnose").success
+    assert not values_of(node.reaches("fitting"))["likely"], "the probabilities belong to the diagnosis that drove"
 
 
 def test_a_live_diagnosis_that_is_aborted_leaves_the_stage_safe_and_the_recording_readable(lab):
