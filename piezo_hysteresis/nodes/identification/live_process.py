@@ -135,11 +135,13 @@ def _is_whole(record: Record, duration: float) -> bool:
 
 def _outcome(live: LiveDiagnosis, path: Path) -> Outcome:
     found = live.found
-    if found is None or found.model is None:
-        raise IdentificationError(live.reason() if found is None else found.reason)
-    answer = found.answer(str(path / "diagnosis.yaml"))
+    if found is None:
+        raise IdentificationError(live.reason())
+    answer = found.answer("" if found.model is None else str(path / "diagnosis.yaml"))
     answer["live"] = live.answer()
     write_json(str(path / "answer.json"), answer)
+    if found.model is None:
+        raise IdentificationError(found.reason)
     summary = "\n".join((live.reason(), found.summary()))
     verdict = f"{found.verdict}: {live.reason()} {found.reason}"
     return Outcome(dumps(found.model), summary, verdict, conclusion=str(found.conclusion))
