@@ -81,6 +81,8 @@ class Recalibration:
         it states none. A mean over kinds of drive is no measure for new records of one kind.
     notices : tuple of Notice
         What was corrected in the records, and what they hardly distinguish.
+    after_loop : bool
+        Whether the record with the largest error is judged after a full loop of the drive.
     """
 
     model: Model
@@ -94,6 +96,7 @@ class Recalibration:
     largest: float
     known: float
     notices: tuple[Notice, ...]
+    after_loop: bool = True
 
     @property
     def is_as_good(self) -> bool:
@@ -103,7 +106,7 @@ class Recalibration:
     @property
     def check(self) -> StageCheck:
         """The errors of the new model, and the known one of the old model."""
-        return StageCheck(self.after, self.largest, self.known, knows_unseen_records(self.model))
+        return StageCheck(self.after, self.largest, self.known, knows_unseen_records(self.model), self.after_loop)
 
 
 def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
@@ -182,6 +185,7 @@ def recalibrate(model: Model, experiment: Experiment) -> Recalibration:
         errors.largest,
         errors.known,
         (*notices, *_unclear(joint, kept)),
+        errors.after_loop,
     )
 
 

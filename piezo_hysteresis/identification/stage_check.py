@@ -63,7 +63,8 @@ class StageCheck:
     unseen : bool
         Whether a record that was not fitted is part of the known error, so that it holds for other records.
     after_loop : bool
-        Whether only what follows a full loop of the drive is judged; else the state at the start is assumed.
+        Whether the record with the largest error is judged after a full loop of the drive; else the state at its start
+        is assumed.
     """
 
     percent: float
@@ -96,7 +97,7 @@ def check_stage(model: Model, records: Sequence[Record], known: Model | None = N
         If the stage or its drive does not move.
     """
     cut, used = moving_after_a_loop(records)
-    if not (after_loop := bool(used)):  # a step or a ramp that only holds afterwards
+    if not (some := bool(used)):  # a step or a ramp that only holds afterwards
         cut, used = tuple(records), moving_in(records)
     check_motion("validate", [cut[i] for i in used])
     single, span = record_errors_of(model, cut, used), stroke(cut)
@@ -109,7 +110,7 @@ def check_stage(model: Model, records: Sequence[Record], known: Model | None = N
         100.0 * float(single.max()) / span,
         100.0 * max(stated, floor) / span if stated else 0.0,
         knows_unseen_records(reference),
-        after_loop,
+        some and not assumes_a_state(cut, used[int(np.argmax(single))]),
     )
 
 
@@ -147,3 +148,14 @@ def after_a_loop(records: Sequence[Record]) -> tuple[Record, ...]:
         cut += [replace(record[:samples], phase=CONDITIONING), record[samples:]] if samples else [record]
         lead = [*lead, record]
     return tuple(cut)
+
+
+def assumes_a_state(cut: Sequence[Record], index: int) -> bool:
+    """Whether the drive reaches an end of its range so late that `after_a_loop` has kept the beginning of the record.
+
+    The error of this record then contains what the stage still remembered from before.
+    """
+    record, lead = cut[index], index
+    while lead > 0 and cut[lead].continues:
+        lead -= 1
+    return np.ptp(record.voltage) > 0.0 and not (lead < index and covers(cut[lead:index], record))

@@ -48,7 +48,8 @@ def stage_sentence(check: StageCheck, percent: float, cause: str) -> str:
     if check.is_as_good or not describes(percent):
         return error_sentence(percent)
     ratio = f"{check.largest:.3g} %, {check.largest / check.known:.2g} times the largest"
-    one = "in one record, after its first full loop," if check.after_loop else "in one record"
+    after = "after its first full loop" if check.after_loop else "which also depends on what the stage did before it"
+    one = f"in one record, {after},"
     if not check.unseen:
         return (
             f"{error_sentence(percent)} {one.capitalize()} it is {ratio} of the records that were fitted, of which "

@@ -22,7 +22,9 @@ from piezo_hysteresis.effects import BoucWen
 from piezo_hysteresis.errors import IdentificationError
 from piezo_hysteresis.identification.stage_check import check_stage
 from piezo_hysteresis.model.model import Model
+from piezo_hysteresis.model.provenance import with_origin
 from piezo_hysteresis.record import Experiment, Record
+from piezo_hysteresis.report.stage_verdict import stage_sentence
 
 ONE_WAY = {
     "step": np.repeat([0.0, 5.0], (100, 400)),
@@ -63,3 +65,30 @@ def test_a_step_in_the_first_sample_counts_as_before(model):
     assert check_stage(
         model, [Record(drive, y + 1e-8 * np.sin(np.arange(500)), 1e-3, phase="step", initial_voltage=0.0)]
     ).after_loop
+
+
+def from_earlier_motion(model, drive):
+    """A record of the unchanged stage, which had been driven to its top before."""
+    before = np.concatenate((np.linspace(0.0, 8.0, 400), np.linspace(8.0, 0.0, 400)))
+    y = model.run(np.concatenate((before, drive)), model.rest(0.0))[0][before.size :]
+    noise = 1e-8 * np.random.default_rng(1).standard_normal(drive.size)
+    return Record(drive, y + noise, 1e-3, phase="triangle")
+
+
+def growing(amplitudes):
+    return np.concatenate([a * np.interp(np.arange(400), [0, 200, 400], [0.0, 1.0, 0.0]) for a in amplitudes])
+
+
+def test_a_drive_that_grows_to_its_end_still_depends_on_the_past(model):
+    known = with_origin(model, Experiment((from_earlier_motion(model, growing([8.0])),)), 0.1, 2e-8, 2e-8, True)
+    check = check_stage(known, [from_earlier_motion(model, growing([2.0, 3.0, 4.0, 5.0]))])
+    assert not check.is_as_good  # the past alone: nothing in the stage has changed
+    assert not check.after_loop
+    assert "after its first full loop" not in stage_sentence(check, check.percent, ".")
+
+
+def test_a_drive_that_is_largest_at_first_does_not(model):
+    known = with_origin(model, Experiment((from_earlier_motion(model, growing([8.0])),)), 0.1, 2e-8, 2e-8, True)
+    check = check_stage(known, [from_earlier_motion(model, growing([5.0, 4.0, 3.0, 2.0]))])
+    assert check.is_as_good
+    assert check.after_loop
