@@ -150,7 +150,11 @@ def _turn(
     if refits:
         refits = _best_of_each([*refits, *refits_of_twins(screened, refits[0], before)])
         best, rejection = _judged(refits, before)
-    if (best is None or rejection is not None) and (late := refits_behind_new_dynamics(model, screened, before)):
+    tried = screened
+    if best is not None and rejection is None:  # a fit that leaves an error may have ended in another minimum
+        same = best.effect.public_name() if best.score.excess > ADEQUATE else None
+        tried = [c for c in screened if c.effect.public_name() == same]
+    if late := refits_behind_new_dynamics(model, tried, before):
         refits = _best_of_each([*refits, *late])
         best, rejection = _judged(refits, before)
     if best is None:

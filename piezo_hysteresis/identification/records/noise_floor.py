@@ -17,7 +17,7 @@
 It is the largest of four values: white noise from the top of the spectrum, where a stage does not move; the scatter
 between periods of a periodic record, which includes jitter and 1/f noise; the resolution of the converter, q/√12; and
 an adequacy floor of 0.03 % of the range, below which a model is good enough for any laboratory. If the voltage was
-measured, the model follows its noise, which the stage has not seen: times the gain of the stage, this adds to the noise.
+measured, the model follows its noise, which the stage has not seen; times the gain of the stage, it adds to the noise.
 """
 
 from __future__ import annotations
