@@ -98,7 +98,7 @@ def test_a_fast_random_drive_is_not_smoothed():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_held_level_is_still_from_its_first_sample_to_its_last(seed):
-    """Samples beyond 2.5 standard deviations stayed, and each shook the loop of the model: effects were named for it."""
+    """Spikes stayed where the noise was largest, and each shook the loop of the model: effects were named for it."""
     drive, noise = np.zeros(20_000), 8e-3
     quiet = quieted(measured(Record(drive, drive, 2e-5, initial_voltage=0.0), noise, seed), noise).voltage
     assert np.abs(np.diff(quiet)).sum() < 10.0 * noise
