@@ -168,12 +168,10 @@ class Record(Pictured):
         >>> Record([0.0, 1.0], [0.0, 2e-6], 1e-3).with_channels(np.flip, phase="backwards").voltage.tolist()
         [1.0, 0.0]
         """
-        changed: dict[str, Any] = {
-            "voltage": change(self.voltage),
-            "displacement": change(self.displacement),
-            "channels": {name: change(values) for name, values in self.channels.items()},
-        }
-        return replace(self, **(changed | fields))
+        others = {name: change(values) for name, values in self.channels.items()}
+        samples = {"voltage": change(self.voltage), "displacement": change(self.displacement)}
+        fields = {"channels": others, **samples, **fields}
+        return replace(self, **fields)
 
     def split(self, *boundaries: int) -> tuple[Record, ...]:
         """Cut at the given sample indices; every part but the first continues the one before it."""
@@ -226,9 +224,8 @@ class Experiment(Pictured):
         return "\n".join((self._title(), *(f"  {record!r}" for record in self)))
 
     def _repr_html_(self) -> str:
-        return html_table(
-            self._title(), ("phase", "samples", "drive voltage", "displacement"), map(Record.summary, self)
-        )
+        titles = ("phase", "samples", "drive voltage", "displacement")
+        return html_table(self._title(), titles, map(Record.summary, self))
 
     def _title(self) -> str:
         return f"Experiment of {counted(len(self), 'phase')}, {self.size} samples, {len(self.notices)} findings"

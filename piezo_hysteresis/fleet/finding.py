@@ -29,6 +29,7 @@ from .source import NamePattern, Source, changed_at, version_of
 from .storage import Storage
 
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm")
+"""Endings of text tables."""
 ENDINGS = frozenset((*_TABLES, ".mat", ".npz", ".npy", ".h5", ".hdf5", ".hdf", ".tdms", ".mcap", ".db3"))
 """Endings of files that count as recordings in a folder or pattern."""
 _BAG = frozenset((".mcap", ".db3", ".zstd"))

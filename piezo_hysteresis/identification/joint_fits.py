@@ -72,7 +72,7 @@ class FitInput:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class JointFit:
+class FitOutcome:
     """Result of a joint fit.
 
     Parameters
@@ -102,7 +102,7 @@ class JointFit:
     structure: StructureChoice | None = None
 
 
-def fit_broadband(given: FitInput, delay: int | None, orders: tuple[int, int] | None, memory: bool) -> JointFit:
+def fit_broadband(given: FitInput, delay: int | None, orders: tuple[int, int] | None, memory: bool) -> FitOutcome:
     """Fit hysteresis and ARX dynamics, which broadband records determine.
 
     Parameters
@@ -150,10 +150,10 @@ def fit_broadband(given: FitInput, delay: int | None, orders: tuple[int, int] | 
         fit, of_memory = choose_memory(fit, corrected, floors, roles.fitted, roles.loops)
         notices += of_memory
     fit = _with_form(fit, (corrected, floors, roles.fitted), given.reach)
-    return JointFit(fit, corrected, tuple(notices), dynamics, table, comparisons)
+    return FitOutcome(fit, corrected, tuple(notices), dynamics, table, comparisons)
 
 
-def fit_structured(given: FitInput, natural: Gauge, gauge: Gauge) -> JointFit:
+def fit_structured(given: FitInput, natural: Gauge, gauge: Gauge) -> FitOutcome:
     """Choose the structure without broadband records, and fit it; `fit.model` has the gauge that was asked for.
 
     Parameters
@@ -183,10 +183,10 @@ def fit_structured(given: FitInput, natural: Gauge, gauge: Gauge) -> JointFit:
     choice = choose_structure(natural.of_model(start), records, quiet, roles.fitted, report)
     fit = gauge.of_fit(choice.fit)
     of_lag = lag_notices(fit, [roles.contents[i] for i in roles.fitted], rivals_counted=True)
-    return JointFit(fit, records, (*notices, *choice.notices, *of_lag), structure=replace(choice, fit=fit))
+    return FitOutcome(fit, records, (*notices, *choice.notices, *of_lag), structure=replace(choice, fit=fit))
 
 
-def fit_loops(given: FitInput) -> JointFit:
+def fit_loops(given: FitInput) -> FitOutcome:
     """Fit the hysteresis and a lag, which is all that loops determine."""
     records, floors, roles = given.records, given.floors, given.roles
     given.report("joint fit", 0.2)
@@ -198,7 +198,7 @@ def fit_loops(given: FitInput) -> JointFit:
         fit = fit_lag(fit.model, *used)
     fit = _with_form(fit, used, given.reach)
     of_lag = lag_notices(fit, [roles.contents[i] for i in roles.fitted], rivals_counted=False)
-    return JointFit(fit, corrected, (*notices, *of_lag))
+    return FitOutcome(fit, corrected, (*notices, *of_lag))
 
 
 def _with_form(fit: Fit, used: Blocks, reach: float) -> Fit:

@@ -158,4 +158,4 @@ def assumes_a_state(cut: Sequence[Record], index: int) -> bool:
     record, lead = cut[index], index
     while lead > 0 and cut[lead].continues:
         lead -= 1
-    return np.ptp(record.voltage) > 0.0 and not (lead < index and covers(cut[lead:index], record))
+    return float(np.ptp(record.voltage)) > 0.0 and not (lead < index and covers(cut[lead:index], record))

@@ -138,8 +138,6 @@ class IdentificationNode(GuardedNode):
             where = f"in {self._folder.root}" if path is None else str(path)
             response.message = f"no experiment {where}; set 'experiment', or identify first"
             return response
-        if self._job is None:
-            self._status.likely = ""
         return self._begin(response, self._fit(diagnosis, path), f"diagnosing {path}")
 
     def _on_abort(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -155,7 +153,7 @@ class IdentificationNode(GuardedNode):
             job.close()
             response.message = "busy; wait, or abort first"
             return response
-        self._job, self._status.goal = job, uuid4().hex
+        self._job, self._status.goal, self._status.likely = job, uuid4().hex, ""
         self.get_logger().info(message)
         response.success, response.message = True, f"{message}; goal {self._status.goal}"
         return response
@@ -204,7 +202,7 @@ class IdentificationNode(GuardedNode):
             return planned[0]
 
         self._moves = True
-        self._status.experiment, self._status.owner, self._status.likely = str(path), self._driver.owner, ""
+        self._status.experiment, self._status.owner = str(path), self._driver.owner
         yield from run_protocol(self, self._driver, plan, path)
         save_decimation(path, {phase.name: phase.stored_every for phase in planned[0]})
         self._folder.last = path
@@ -225,7 +223,7 @@ class IdentificationNode(GuardedNode):
 
     def _diagnose_live(self, path: Path) -> Generator[Progress]:
         self._moves = True
-        self._status.experiment, self._status.owner, self._status.likely = str(path), self._driver.owner, ""
+        self._status.experiment, self._status.owner = str(path), self._driver.owner
         settings = LiveSettings.from_values(read(self, IDENTIFICATION))
         protocols = LiveProtocols(path, settings, self._status.set_likely)
         try:
