@@ -91,8 +91,7 @@ def select(
         steps = certain(steps)
         in_time = True
     found = next((step.best for step in reversed(steps) if step.accepted), None)
-    last = (found.fit.model, found.score, found.training_data) if found else (model, score, training_data)
-    now, reached, data = last
+    now, reached, data = (found.fit.model, found.score, found.training_data) if found else (model, score, training_data)
     return Selection(model, now, reached, tuple(steps), data.null, in_time, data)
 
 

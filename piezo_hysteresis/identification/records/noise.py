@@ -172,5 +172,5 @@ def without_voltage_noise(experiment: Experiment) -> tuple[Experiment, tuple[Not
         return experiment, ()
     records = tuple(quieted(r, n) for r, n in zip(experiment.records, noise.tolist(), strict=True))
     said = f"the voltage was measured with {noise.max():.2g} V of noise"
-    message = f"{said}, which was removed, because the stage has not seen it"
+    message = f"{said}, which was removed where the drive is smooth, because the stage has not seen it"
     return replace(experiment, records=records), (Notice(VOLTAGE_NOISE, message),)
