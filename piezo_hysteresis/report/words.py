@@ -20,7 +20,7 @@ from ..identification.fit.form_uncertainty import ADEQUACY
 
 USELESS, POOR = 30.0, 3.0
 """Free-run errors [% of range] from which a model describes nothing, and from which it is poor."""
-FLOOR = f"The noise floor of a phase is its sensor noise or {100 * ADEQUACY:g} % of the range, whichever is larger."
+FLOOR = f"The noise floor of a phase is its noise or {100 * ADEQUACY:g} % of the range, whichever is larger."
 """What the floor beside an error is."""
 
 
