@@ -36,7 +36,7 @@ from .reachability import NearestPath, Reachability, UnreachablePart
 
 Array = NDArray[np.float64]
 
-LEAST, MOST = 1e-4, 1e-3
+LEAST, MOST = 1e-4, 1e-2
 """Deviations below the free-run error of the model count as zero; these shares of the range of the path bound it."""
 
 STEPS = 8
