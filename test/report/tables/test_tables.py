@@ -111,7 +111,7 @@ def test_the_floor_is_explained_in_one_sentence_everywhere():
     """Errors of 0.020 stood beside a floor of 0.030, which was called the error that noise alone causes."""
     gap = {"before": 0.3, "after": 0.02, "floor": 0.03, "unseen": True, "per_phase": {}}
     table = gap_table({"gap_percent_of_range": gap})
-    assert FLOOR.endswith("sensor noise or 0.03 % of the range, whichever is larger.")
+    assert FLOOR.endswith("is its noise or 0.03 % of the range, whichever is larger.")
     assert table.note.endswith(FLOOR) and FLOOR in FREE_RUN
 
 
