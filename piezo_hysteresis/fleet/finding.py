@@ -25,12 +25,11 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from ..errors import PiezoError, RecordingError, printable
+from ..recording.formats.csv import ENDINGS as TABLES
 from .source import NamePattern, Source, changed_at, version_of
 from .storage import Storage
 
-_TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm")
-"""Endings of text tables."""
-ENDINGS = frozenset((*_TABLES, ".mat", ".npz", ".npy", ".h5", ".hdf5", ".hdf", ".tdms", ".mcap", ".db3"))
+ENDINGS = frozenset((*TABLES, ".mat", ".npz", ".npy", ".h5", ".hdf5", ".hdf", ".tdms", ".mcap", ".db3"))
 """Endings of files that count as recordings in a folder or pattern."""
 _BAG = frozenset((".mcap", ".db3", ".zstd"))
 """Endings of the files of a bag."""

@@ -142,7 +142,7 @@ def fit_broadband(given: FitInput, delay: int | None, orders: tuple[int, int] | 
     corrected, of_averages = without_intersample_error(fit.model, records, floors, roles.fitted)
     if corrected is not records:
         fit = fit_joint(fit.model, corrected, floors, roles.fitted)
-    noise = [i for i in roles.broadband if records[i].phase.split("_")[0] == "noise"]
+    noise = [i for i in roles.broadband if records[i].is_named("noise")]
     comparisons, of_inputs = compare_inputs(fit.model, corrected, noise, samples, chosen)
     notices += [*of_dynamics, *of_averages, *of_inputs]
     if memory:

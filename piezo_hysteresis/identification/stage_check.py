@@ -33,7 +33,8 @@ from ..record import CONDITIONING, Record
 from .fit.normal_equations import residuals
 from .free_run_error import free_per_record
 from .records.conditioning_split import AT_THE_END, conditioning_length, covers
-from .records.excitation_check import SHORTEST_RECORD, check_motion, moves, travel
+from .records.excitation_check import SHORTEST_RECORD, check_motion, moves
+from .records.noise import travel
 from .records.noise_floor import floors, stroke
 
 Array = NDArray[np.float64]

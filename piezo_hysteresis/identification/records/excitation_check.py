@@ -28,6 +28,7 @@ from ...errors import IdentificationError
 from ...record import Notice, Record
 from ..structure.pieces import Kind, pieces_of
 from .excitation_content import HELD, RINGS, SLOW, ExcitationContent, excitation_content
+from .noise import travel
 from .steady_waves import SWING, find_turns
 
 SHORTEST_RECORD = 16
@@ -92,11 +93,6 @@ def missing_excitation(
 def moves(record: Record) -> bool:
     """Whether the drive moves in a record."""
     return travel(record) > 0.0
-
-
-def travel(record: Record) -> float:
-    """Range of the drive in a record, from the level before it [V]."""
-    return float(np.ptp(np.append(record.voltage, record.settled_voltage)))
 
 
 def one_way(records: Sequence[Record], used: Collection[int]) -> tuple[Notice, ...]:

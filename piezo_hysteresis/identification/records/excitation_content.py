@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...record import Record, Samples
-from .noise import noise_of, noise_on_motion, voltage_noise
+from .noise import noise_of, noise_on_motion, travel, voltage_noise
 from .once import once_per_record
 from .steady_waves import is_row_of_waves, rates_of_waves
 
@@ -109,7 +109,7 @@ class ExcitationContent:
 @once_per_record
 def excitation_content(record: Record) -> ExcitationContent:
     """Judge a record by the spectrum of its dv/dt and the noise of its displacement."""
-    span = float(np.ptp(np.append(record.voltage, record.settled_voltage)))
+    span = travel(record)
     noise = float(voltage_noise((record,))[0])
     spectrum = _excitation(np.diff(record.voltage), max(UNMEASURED * span, ABOVE * noise))
     power = np.abs(spectrum) ** 2

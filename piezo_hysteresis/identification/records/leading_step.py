@@ -25,6 +25,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from ...record import Record
+from .noise import travel
 
 Blocks = tuple[Sequence[Record], Sequence[float], Collection[int]]
 """Records in order, the floor of each [m], and the indices of those to fit."""
@@ -60,8 +61,7 @@ def begins_with_a_jump(record: Record) -> bool:
     """True if the first voltage is far from the settled one, compared with the speed and the range of the drive."""
     jump = abs(float(record.voltage[0]) - record.settled_voltage)
     speed = np.abs(np.diff(record.voltage))
-    reach = float(np.ptp(np.append(record.voltage, record.settled_voltage)))
-    return bool(speed.size and jump > 0.0 and jump >= max(SUDDEN * float(np.median(speed)), LARGE * reach))
+    return bool(speed.size and jump > 0.0 and jump >= max(SUDDEN * float(np.median(speed)), LARGE * travel(record)))
 
 
 def steps_apart(records: Sequence[Record], floors: Sequence[float], fitted: Collection[int]) -> Blocks:

@@ -96,6 +96,11 @@ def sensor_noise(records: Sequence[Record]) -> list[float]:
     return least
 
 
+def travel(record: Record) -> float:
+    """Range of the drive in a record, from the level before it [V]."""
+    return float(np.ptp(np.append(record.voltage, record.settled_voltage)))
+
+
 def voltage_noise(records: Sequence[Record]) -> Samples:
     """Standard deviation of the voltage noise of every record [V]; 0 if the voltage is a command and not measured.
 
@@ -104,7 +109,7 @@ def voltage_noise(records: Sequence[Record]) -> Samples:
     """
     long = [r for r in records if r.size >= FEWEST_BENDS + max(BENDS)]
     sizes = [min(noise_on_motion(r.voltage, order) for order in BENDS) for r in long]
-    span = max((float(np.ptp(np.append(r.voltage, r.settled_voltage))) for r in records), default=0.0)
+    span = max(map(travel, records), default=0.0)
     least = min(sizes, default=0.0)
     if not SMALLEST * span < least <= LARGEST * span or not _is_white(long[sizes.index(least)].voltage):
         return np.zeros(len(records))

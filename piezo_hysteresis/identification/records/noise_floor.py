@@ -31,7 +31,7 @@ from ...blocks.block import Array
 from ...channel_mapping import quantity_of
 from ...record import Experiment, Record
 from ..fit.form_uncertainty import ADEQUACY
-from .noise import noise_on_motion
+from .noise import noise_on_motion, travel
 from .once import once_per_record
 
 ADEQUATE = 1.5
@@ -177,7 +177,7 @@ def noise_floors(records: Sequence[Record]) -> Array:
     Scatter between periods is the sum of white noise, slower noise in proportion to it, and jitter of the clock in
     proportion to the speed. Records without periods use the estimates of the periodic ones.
     """
-    drive = max(float(np.ptp(np.append(r.voltage, r.settled_voltage))) for r in records)
+    drive = max(map(travel, records))
     followed = np.array([r.voltage_noise for r in records]) * (stroke(records) / drive if drive > 0.0 else 0.0)
     return np.hypot(_sensor_noise(records), followed)
 

@@ -34,7 +34,7 @@ from ..table.text_cells import Cells, read_cells
 from ..table.time_column import TimeColumn
 from ..whole_file import whole_file
 
-_ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm")
+ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm")
 """Ends of the names of text tables."""
 _ROWS = 1 << 15
 """Number of rows that are written together."""
@@ -58,7 +58,7 @@ class Csv:
 
     def recognises(self, path: Path) -> bool:
         """True for the endings of text tables, and for any text with rows of numbers."""
-        return path.is_file() and (path.suffix.lower() in _ENDINGS or _is_table(path))
+        return path.is_file() and (path.suffix.lower() in ENDINGS or _is_table(path))
 
     def read(self, path: Path, options: ReadOptions) -> Experiment:
         """The table as phases: those of its labels, or phases proposed from the shape of the drive."""
