@@ -24,6 +24,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
+from functools import partial
 from typing import Any
 
 from .. import recording
@@ -32,7 +33,7 @@ from .code_hash import code_hash
 from .extra import package
 from .fetching import content_hash, fetch
 from .source import Source
-from .time_limit import RecordingTimeSpent, within
+from .time_limit import RecordingTimeSpent, run_within
 from .work import Work
 
 Row = dict[str, Any]
@@ -137,8 +138,7 @@ def attempt(order: Order) -> Row:
     began, spent = time.monotonic(), time.process_time()
     columns: Row = {}
     try:
-        with within(order.limit, _end_of_worker()), ExitStack() as stack:
-            status = _process(order, stack, columns)
+        status = run_within(order.limit, partial(_process, order, columns), _end_of_worker())
     except RecordingTimeSpent:
         status = RowStatus.TIMED_OUT
         columns["error"] = _late(order)
@@ -146,7 +146,12 @@ def attempt(order: Order) -> Row:
     return order.row(status, worker=f"{socket.gethostname()}", **columns)
 
 
-def _process(order: Order, stack: ExitStack, columns: Row) -> RowStatus:
+def _process(order: Order, columns: Row) -> RowStatus:
+    with ExitStack() as stack:
+        return _read_and_work(order, stack, columns)
+
+
+def _read_and_work(order: Order, stack: ExitStack, columns: Row) -> RowStatus:
     try:
         path = fetch(order.source, stack)
         columns["data_hash"] = content_hash(order.source, path)

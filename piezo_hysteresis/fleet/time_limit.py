@@ -19,32 +19,39 @@ from __future__ import annotations
 import ctypes
 import os
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from typing import TypeVar
 
 GRACE = 60.0
 """Time between the interruption and the end of the process [s]; a library that runs must return to Python within it."""
+
+Result = TypeVar("Result")
 
 
 class RecordingTimeSpent(BaseException):
     """The time limit of a recording has passed. It is not an `Exception`, so that error handlers do not catch it."""
 
 
-@contextmanager
-def within(limit: float, end_process: Callable[[], None] | None = None) -> Iterator[None]:
-    """Raise `RecordingTimeSpent` in this thread after a time.
+def run_within(limit: float, work: Callable[[], Result], end_process: Callable[[], None] | None = None) -> Result:
+    """Do work in this thread, and raise `RecordingTimeSpent` in it after a time.
 
     Parameters
     ----------
     limit : float
         Time [s]; infinite for no limit.
+    work : callable
+        Called without arguments.
     end_process : callable, optional
         Called from another thread if this one has not returned `GRACE` later. By default it ends the process at once,
         so that the scheduler detects the loss of the worker.
+
+    Returns
+    -------
+    object
+        What `work` returns.
     """
     if limit == float("inf"):
-        yield
-        return
+        return work()
     end = end_process or (lambda: os._exit(1))
     thread, lock, over, gone = threading.get_ident(), threading.Lock(), False, threading.Event()
 
@@ -57,15 +64,22 @@ def within(limit: float, end_process: Callable[[], None] | None = None) -> Itera
         if not gone.wait(GRACE):
             end()
 
-    watcher = threading.Thread(target=watch, daemon=True, name="time limit")
-    try:
-        watcher.start()
-        yield
-    finally:
-        gone.set()
+    def stop_watching() -> None:
+        nonlocal over
         with lock:
             over = True
             _raise_in(thread, None)  # a pending exception must not reach later code
+        gone.set()
+
+    watcher = threading.Thread(target=watch, daemon=True, name="time limit")
+    try:
+        watcher.start()
+        return work()
+    finally:
+        try:
+            stop_watching()
+        except RecordingTimeSpent:  # the limit has passed here; it passes once
+            stop_watching()
 
 
 def _raise_in(thread: int, error: type[BaseException] | None) -> None:
