@@ -32,6 +32,7 @@ from ..identification.records.noise_floor import ADEQUATE
 from ..model.model import Model
 from ..model.provenance import with_origin
 from ..record import Experiment, Record
+from .search.baseline_setup import BaselineSetup
 from .search.selection_result import explained
 
 FALLS = 0.9
@@ -191,3 +192,12 @@ def measure_gap(
         live=float(np.sqrt(np.mean(np.square(live)))),
         free_zeros=offset,
     )
+
+
+def gap_between(
+    before: Model, after: Model, setup: BaselineSetup, chosen: Sequence[int], *, offset: bool = False
+) -> Gap:
+    """`measure_gap` on the records `chosen` of a search; only its test records are unseen."""
+    unseen = set(chosen) <= set(setup.test_records)
+    least = setup.least.tolist()
+    return measure_gap((before, after), setup.records, chosen, least, setup.span, unseen=unseen, offset=offset)

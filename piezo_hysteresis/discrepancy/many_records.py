@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -26,12 +25,11 @@ from ..identification.fit.form_uncertainty import with_alternative, with_form_un
 from ..identification.fit.time_limit import ending_at
 from ..identification.records.excitation_check import missing_excitation
 from ..identification.records.noise_floor import ADEQUATE
-from ..model.model import Model
 from .choice.next_experiment import best_next_experiment
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .explicit_step import explicit_model, without_steps
-from .gap import Gap, measure_gap
+from .gap import gap_between
 from .localise import ResidualShare, located
 from .search.baseline_setup import BaselineSetup, prepare_baseline
 from .search.refit import LAST, PRECISE, TOLERANCE, joint, restart
@@ -121,26 +119,20 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
     whole, noise = setup.for_last_fit()
     named = is_explained(selection)
     first = joint(selection.baseline, whole, LAST, TOLERANCE if named else PRECISE)
-
-    def gap_of(before: Model, after: Model, chosen: Sequence[int], *, offset: bool = False) -> Gap:
-        unseen = chosen is setup.test_records
-        both, least = (before, after), setup.least.tolist()
-        return measure_gap(both, setup.records, chosen, least, setup.span, unseen=unseen, offset=offset)
-
-    tested = setup.test_records or setup.fitted
+    tested = setup.tested
     falls = diverges = False
     if named:
         final = _finished(selection, whole)
         with suppress(DivergenceError):  # on a test record, which moves further than those that were fitted
-            gap = gap_of(first.model, final.model, tested)
+            gap = gap_between(first.model, final.model, setup, tested)
             falls = gap.falls
     if not falls:
         final = first
         try:
-            gap = gap_of(first.model, first.model, tested)
+            gap = gap_between(first.model, first.model, setup, tested)
         except DivergenceError:
             tested, diverges = setup.fitted, True
-            gap = gap_of(first.model, first.model, tested)
+            gap = gap_between(first.model, first.model, setup, tested)
     free = whole.free_with(final.model)
     final = with_form_uncertainty(final, whole.records, free, whole.floors, noise, setup.span)
     if falls and (other := selection.alternative) is not None:
@@ -154,10 +146,10 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
     fit: Fit | None = final
     if given is not None:
         with suppress(DivergenceError):
-            gap = gap_of(given, delivered, tested, offset=True)
+            gap = gap_between(given, delivered, setup, tested, offset=True)
             if not falls and gap.after > gap.before:  # a refit that names nothing must not predict worse
                 delivered, fit = given, None
-                gap = gap_of(given, given, tested, offset=True)
+                gap = gap_between(given, given, setup, tested, offset=True)
     if falls:
         said = named_conclusion(selection, gap)
     conclusion, reason = said
@@ -167,7 +159,7 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
     everywhere = None
     if delivered is not given and len(tested) < len(setup.usable):
         with suppress(DivergenceError):
-            everywhere = gap_of(delivered, delivered, setup.usable, offset=given is not None)
+            everywhere = gap_between(delivered, delivered, setup, setup.usable, offset=given is not None)
     return Diagnosis(
         conclusion,
         reason,

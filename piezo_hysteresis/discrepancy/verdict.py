@@ -16,12 +16,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 
 import numpy as np
 
+from ..identification.fit.cross_validation import Score
 from ..identification.fit.form_uncertainty import ADEQUACY
 from ..identification.records.noise_floor import ADEQUATE
+from ..record import Notice
 from .gap import Gap
 from .search.selection_result import Selection
 
@@ -35,6 +39,16 @@ NAMED, NAMED_FAR = 0.6, 0.75
 """Smallest explained fraction of the gap for a name, and the same if the remaining error is large."""
 FAR = 10.0
 """V above which the remaining error is large: a similar effect of another family may explain as much of the gap."""
+
+CHOSEN = (
+    "the saved model has the structure that predicts best in cross-validation; it explains {} of the gap of the "
+    "published model"
+)
+"""What is said of the saved model without a further effect, if no model was given."""
+REFITTED = "the saved model is the given one, fitted to these records; it explains {} of the gap of the given model"
+"""The same, if a refit of the given model is saved."""
+KEPT = "the given model is saved unchanged, because a fit to these records predicts what was left out hardly better"
+"""The same, if the given model is saved."""
 
 MORE_MAY_BE_MISSING = " The time limit ended the search; more effects may be missing."
 """Added to the reason if effects are named although the time limit ended the search."""
@@ -143,3 +157,62 @@ def unnamed_conclusion(selection: Selection, falls: bool, gap: Gap) -> tuple[Con
         why = "".join(f" ({r.reason})" for r in first.rejected if r.name == first.best.name)
         message = f"; the closest effect is {closest}, which explains {share:.0f} % of the gap{why}"
     return Conclusion.UNEXPLAINED_GAP, f"Something is missing that no effect of the catalogue explains{message}."
+
+
+def conclusion_of_few(
+    selection: Selection,
+    decided: bool,
+    before: Score,
+    gap: Gap,
+    count: int,
+    several: bool,
+    missing: Sequence[Notice],
+    origin: str = CHOSEN,
+) -> tuple[Conclusion, str]:
+    """The conclusion and its reason.
+
+    A small error of the extended model is no evidence that nothing is missing in the published one. One rate and one
+    amplitude can be explained by wrong effects. `origin` says which model is saved, if it contains no further effect.
+    """
+    enough, is_adequate = count >= FEWEST_RECORDS, before.excess <= ADEQUATE
+    if gap.falls and decided:
+        return Conclusion.MISSING_EFFECT, _reason_of_structure(selection, gap)
+    if gap.falls and enough and several and is_explained(selection):
+        return named_conclusion(selection, gap)
+    if not selection.in_time:
+        return unnamed_conclusion(selection, gap.falls, gap)
+    if enough and not decided and (several or is_adequate):
+        judged = replace(gap, after=gap.before) if is_adequate else gap  # of the published model
+        conclusion, reason = unnamed_conclusion(selection, gap.falls, judged)
+        if is_adequate or conclusion is not Conclusion.NOTHING_MISSING:
+            return conclusion, reason
+    closed = f"{100 * gap.explained:.0f} %"
+    names = [s.best.effect.public_name() for s in selection.accepted]
+    if is_adequate:
+        which = "published model" if origin == CHOSEN else "given model, fitted to these records,"
+        message = f"the error of the {which} is at the noise floor, so the data cannot show further effects"
+    elif names:
+        message = (
+            f"the closest effect is {' with '.join(names)}, which was added to the model; "
+            f"the saved model explains {closed} of the gap"
+        )
+    else:
+        message = origin.format(closed)
+    records = ("one record" if count == 1 else f"{count} records") + ("" if several else " of one rate and amplitude")
+    reason = "; ".join(
+        (f"No effect is named, because {records} cannot distinguish effects", message, *(n.message for n in missing))
+    )
+    return Conclusion.INSUFFICIENT_DATA, f"{reason}."
+
+
+def _reason_of_structure(selection: Selection, gap: Gap) -> str:
+    """Why effects are named that the structure needs."""
+    names = [s.best.effect.public_name() for s in selection.accepted]
+    said = (
+        f"The model does not contain {' and '.join(names)}. An extended model predicts rates, amplitudes and "
+        f"records better that were left out of the fit; it explains {100 * gap.explained:.0f} % of the gap."
+    )
+    for name, step in zip(names, selection.accepted, strict=True):
+        if step.confusable_with:
+            said += f" These data cannot distinguish {name} from {' or '.join(step.confusable_with)}."
+    return said + ("" if selection.in_time else MORE_MAY_BE_MISSING)

@@ -22,7 +22,7 @@ import pytest
 from benchmarks.naming_cases import Case
 from examples.demo.truth import in_numbers_of
 from examples.hide_effect import HIGHEST_VOLTAGE, individual_stage
-from piezo_hysteresis.discrepancy import Verdict, diagnose, many_records
+from piezo_hysteresis.discrepancy import Verdict, diagnose, gap
 from piezo_hysteresis.discrepancy.gap import measure_gap
 from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.protocol import protocol
@@ -76,7 +76,7 @@ def test_a_model_that_diverges_on_a_test_record_is_not_named(monkeypatch):
             raise DivergenceError("arx", 0, 0.0)
         return measure_gap(models, *others, **options)
 
-    monkeypatch.setattr(many_records, "measure_gap", measured)
+    monkeypatch.setattr(gap, "measure_gap", measured)
     found = diagnose(HUM.experiment())
     assert found.verdict is Verdict.UNKNOWN
     assert found.names == ()

@@ -24,7 +24,7 @@ from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
 from piezo_hysteresis.discrepancy.gap import Gap, PhaseGap
 from piezo_hysteresis.discrepancy.search.selection_result import Selection
-from piezo_hysteresis.discrepancy.single_record import CHOSEN, KEPT, REFITTED, conclusion_of_few
+from piezo_hysteresis.discrepancy.verdict import CHOSEN, KEPT, REFITTED, conclusion_of_few
 from piezo_hysteresis.effects import Arx, Backlash, BoucWen, Creep, Effect, ThermalDrift
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance

@@ -78,6 +78,11 @@ class BaselineSetup:
     baseline: Fit
     score: Score
 
+    @property
+    def tested(self) -> Sequence[int]:
+        """Indices of the records on which the gap is measured: the fitted ones if there are no test records."""
+        return self.test_records or self.fitted
+
     def for_last_fit(self) -> tuple[TrainingData, Array]:
         """The training data, averaged or cut to about `FITTED` samples only where records are longer, and its noise."""
         records, least, noise = _short(self.records, self.noise, self.lost, self.span, self.fitted, FITTED)

@@ -26,7 +26,7 @@ from ...effects import Creep, Offset, UnnamedCorrection, UnnamedPlays, UnnamedPo
 from ...identification.identified_range import identified_range
 from ...model.model import Model
 from ...record import Experiment
-from ..gap import measure_gap
+from ..gap import gap_between
 from ..search.baseline_setup import BaselineSetup
 from ..search.candidate_refits import LEAST_GAIN
 from ..search.refit import FAILURES, LAST, PRECISE, joint
@@ -129,11 +129,10 @@ def judged_on_test_records(
 ) -> Correction:
     """The correction after the last fit to all samples, judged on the test records."""
     training_data, _ = setup.for_last_fit()
-    least, span = setup.least.tolist(), setup.span
     try:
         fit = joint(model.with_effect(correction.effect), training_data, LAST, PRECISE)
-        gap = measure_gap((model, fit.model), setup.records, setup.test_records, least, span, unseen=True)
-        everywhere = measure_gap((fit.model, fit.model), setup.records, setup.usable, least, span, unseen=False)
+        gap = gap_between(model, fit.model, setup, setup.test_records)
+        everywhere = gap_between(fit.model, fit.model, setup, setup.usable)
     except FAILURES as error:
         return replace(correction, refusal=f"its last fit failed ({error})")
     removed, (effect,) = gap.explained, corrections_in(fit.model)
