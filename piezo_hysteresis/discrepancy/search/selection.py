@@ -137,15 +137,53 @@ def _turn(
     effects: Collection[type[Effect]],
     progress: Progress,
 ) -> Step | None:
+    """One step: the best effect of those that the model does not contain; None if no refit converges."""
     progress("score test of the catalogue", 0.0)
     training_data = training_data.with_peaks(residuals(model, training_data.records, training_data.free_with(model)))
     present = {e.public_name() for e in model.effects}
     twins = {e.name: t.name for e in effects for t in model.effects if e.is_twin_of(t)}
-    absent = [e for e in effects if e.public_name() not in present and e.name not in twins]
-    screened = screen(model, training_data, absent)
-    refits = _best_of_each(refit_candidates(model, _worth_a_refit(screened, before), before, progress))
+    screened = screen(
+        model, training_data, [e for e in effects if e.public_name() not in present and e.name not in twins]
+    )
+    refits, best, rejection = _best_effect(model, screened, before, progress)
+    if best is None:
+        return None
+    rejection = rejection or _untried_twin(type(best.effect), effects)
+    gain = before.cost - best.score.cost
+
+    def is_rival(candidate: FittedCandidate) -> bool:
+        lead, error = best.score.better_than(candidate.score)
+        return rejection is None and lead < CLOSE * gain and lead < 2.0 * error
+
+    def behind(candidate: FittedCandidate) -> Rejection:
+        lead, error = best.score.better_than(candidate.score)
+        message = f"in cross-validation its mean ln R² is {lead:.2f} ± {error:.2f} higher than with {best.name}"
+        return Rejection(candidate.name, message)
+
+    def not_refitted(candidate: Candidate) -> Rejection:
+        most = max(0.0, before.cost - candidate.score.cost)
+        message = (
+            f"it is predicted to lower mean ln R² by at most {most:.2f}, where {best.name} lowers it by {gain:.2f}"
+        )
+        return Rejection(candidate.name, message)
+
+    fitted = [c for c in refits if c.name != best.name]
+    others = [c for c in screened if all(c.name != r.name for r in refits)]
+    rejected = [Rejection(name, f"on slow drive it equals {t}, which is in the model") for name, t in twins.items()]
+    rejected += [] if rejection is None else [rejection]
+    rejected += [behind(c) for c in fitted if not is_rival(c)]
+    rejected += map(not_refitted, others)
+    rivals = tuple(filter(is_rival, fitted))
+    return Step(before, best, rejection is None, rivals, tuple(rejected), (*refits, *others))
+
+
+def _best_effect(
+    model: Model, screened: Sequence[Candidate], before: Score, progress: Progress
+) -> tuple[list[FittedCandidate], FittedCandidate | None, Rejection | None]:
+    """Refits of the best candidates, the best of them, and the rejection of its effect or None."""
     best: FittedCandidate | None = None
     rejection: Rejection | None = None
+    refits = _best_of_each(refit_candidates(model, _worth_a_refit(screened, before), before, progress))
     if refits:
         refits = _best_of_each([*refits, *refits_of_twins(screened, refits[0], before)])
         best, rejection = _judged(refits, before)
@@ -156,31 +194,7 @@ def _turn(
     if late := refits_behind_new_dynamics(model, tried, before):
         refits = _best_of_each([*refits, *late])
         best, rejection = _judged(refits, before)
-    if best is None:
-        return None
-    rejection = rejection or _untried_twin(type(best.effect), effects)
-    accepted, rivals = rejection is None, list[FittedCandidate]()
-    rejected = [Rejection(name, f"on slow drive it equals {t}, which is in the model") for name, t in twins.items()]
-    rejected += [] if rejection is None else [rejection]
-    for candidate in refits:
-        if candidate.name == best.name:
-            continue
-        lead, error = best.score.better_than(candidate.score)
-        close = lead < CLOSE * (before.cost - best.score.cost)
-        if accepted and close and lead < 2.0 * error:
-            rivals.append(candidate)
-        else:
-            message = f"in cross-validation its mean ln R² is {lead:.2f} ± {error:.2f} higher than with {best.name}"
-            rejected.append(Rejection(candidate.name, message))
-    others = [c for c in screened if all(c.name != r.name for r in refits)]
-    gain = before.cost - best.score.cost
-    for other in others:
-        most = max(0.0, before.cost - other.score.cost)
-        message = (
-            f"it is predicted to lower mean ln R² by at most {most:.2f}, where {best.name} lowers it by {gain:.2f}"
-        )
-        rejected.append(Rejection(other.name, message))
-    return Step(before, best, accepted, tuple(rivals), tuple(rejected), (*refits, *others))
+    return refits, best, rejection
 
 
 def _worth_a_refit(screened: Sequence[Candidate], before: Score) -> Sequence[Candidate]:
