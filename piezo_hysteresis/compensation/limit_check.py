@@ -97,14 +97,20 @@ def reachable(
     tolerance = float(np.clip(free_run_error(model) or 0.0, LEAST * span, MOST * span))
     bad = np.flatnonzero(np.abs(off) > tolerance)
     lowest, direction = _at_the_lowest_voltage(model, limits)
-    parts = []
+    settling = np.full(max(round(APPROACH / model.sample_period), limited.preview, 1), limits.voltage_min)
+    parts, moved, played = [], state, 0
     for a, b in _runs(bad, max(1, round(2e-3 / model.sample_period))):
         worst = a + int(np.abs(off[a : b + 1]).argmax())
         kept = direction * (float(aim[worst]) - lowest) >= -tolerance
         part = _part(model, limits, needed[a : b + free.preview + 1], a, b + 1, float(off[worst]))
         if no_voltage[worst]:
             part = replace(part, limit="model")
-        parts.append(replace(part, after_loop=kept and part.limit == "voltage_min"))
+        if kept and part.limit == "voltage_min":  # a drive that is only too late would still get there
+            _, moved = model.run(given[played : worst + limited.preview + 1], moved)
+            played = worst + limited.preview + 1
+            held, _ = model.run(settling, moved)
+            part = replace(part, after_loop=direction * (float(held[-1]) - float(aim[worst])) > tolerance)
+        parts.append(part)
     nearest = None
     if parts and search:
         nearest = nearest_path(model, limits, y, state, band=band, approximate=approximate)

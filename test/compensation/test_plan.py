@@ -23,7 +23,7 @@ import pytest
 
 from piezo_hysteresis.compensation import Limits, plan, reachable
 from piezo_hysteresis.compensation.expected_error import free_run_error, parameter_error
-from piezo_hysteresis.effects import AmplifierSaturation, AmplifierSlewLimit, BoucWen, Creep, Effect
+from piezo_hysteresis.effects import AmplifierSaturation, AmplifierSlewLimit, Arx, BoucWen, Creep, Effect
 from piezo_hysteresis.effects.drive.amplifier_slew_limit_settling import AmplifierSlewLimitSettling
 from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.model.parameter_covariance import ParameterCovariance
@@ -93,6 +93,14 @@ def test_only_what_rest_reaches_is_said_to_be_kept_by_the_hysteresis(sign: float
     assert after.parts[-1].after_loop and "keeps the stage beyond it" in str(after.parts[-1])
     outside = reachable(model, UNIPOLAR, -sign * swing(50.0, 0.0, 1e-6, 1), search=False)
     assert {(part.limit, part.after_loop) for part in outside.parts} == {("voltage_min", False)}
+
+
+def test_what_waiting_reaches_is_not_said_to_be_kept_by_the_hysteresis() -> None:
+    """To fall fast, a stage with a lag of 1 ms needs a negative voltage. It has no hysteresis."""
+    y = swing(200.0, 1e-7, 5e-6, 2)
+    slow = stage().with_effect(Arx(a=[-0.98], b=[0.02], delay=0)).with_values({"bouc_wen.A": 0.0})
+    found = reachable(slow, UNIPOLAR, y, search=False)
+    assert {(part.limit, part.after_loop) for part in found.parts} == {("voltage_min", False)}
 
 
 def test_too_high_and_too_fast_are_distinguished() -> None:
