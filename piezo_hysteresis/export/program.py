@@ -31,7 +31,7 @@ from ..model.model_parameters import PREFIX, to_parameters
 from . import c_text
 from .inversion import inversion
 from .prediction import prediction, rest_calls, step_calls, units
-from .vectors import vectors
+from .vectors import rounding, vectors
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,40}")
 """Valid names of a program; every file, type and function begins with the name."""
@@ -93,6 +93,7 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
         "rest_calls": rest_calls(name, found.forms, "state"),
         "step_calls": step_calls(name, found.forms, "state"),
         "vectors": vectors(model, inverse),
+        "rounding": rounding(found.forms.values()),
         "inverse": None,
     }
     if inverse is not None:
@@ -101,6 +102,7 @@ def c_program(model: Model, name: str = "piezo", inverse: Inverse | None = None)
             "exact": inverse.is_exact,
             "limits": inverse.limits,
             "preview": turned.preview,
+            "rounding": rounding(turned.forms.values()),
             "structures": [s for n, form in turned.forms.items() for s in c_text.structures(name, n, form)],
             "has_state": [n for n, form in turned.forms.items() if form.has_state],
             "functions": {

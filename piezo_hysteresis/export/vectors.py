@@ -16,12 +16,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.signal
 from numpy.typing import NDArray
 
+from ..c_form import CForm
 from ..compensation import Inverse
 from ..model.model import Model
 
@@ -94,6 +96,21 @@ def vectors(model: Model, inverse: Inverse | None = None) -> Vectors:
         return Vectors(start, voltage, channels, displacement, None)
     wanted, _ = inverse.run(displacement, inverse.rest(start))
     return Vectors(start, voltage, channels, displacement, wanted, inverse.noise_gain)
+
+
+def rounding(forms: Iterable[CForm]) -> float:
+    """Bound of the rounding errors of difference equations after a self-test, relative to their outputs.
+
+    Every term a_k y_(i − k) is rounded, and the error passes 1/A. With poles near 1, as creep has them, the terms
+    nearly cancel.
+    """
+    worst = 0.0
+    for form in forms:
+        worst = max(worst, rounding(form.parts.values()))
+        a = np.append(1.0, np.asarray(form.numbers.get("a", ()), dtype=np.float64))
+        response = scipy.signal.lfilter([1.0], a, np.eye(1, SIZE)[0])
+        worst = max(worst, float(np.finfo(float).eps * np.abs(a).sum() * np.abs(response).sum()))
+    return worst
 
 
 def _stated(model: Model, key: str, otherwise: float) -> float:

@@ -94,6 +94,18 @@ def test_the_inverse_of_a_loop_with_exponent_passes_at_a_round_slew_limit(tmp_pa
 
 
 @needs_compiler
+def test_the_self_test_of_a_stage_with_slow_poles_and_a_resonance_passes(tmp_path):
+    """Creep that the ARX describes: without fused multiply-add, rounding moved y by 2e-11 and u by 3e-11."""
+    slow, ringing = [0.99983, 0.99745, 0.93, 0.15], [0.9776 * np.exp(0.56j), 0.9776 * np.exp(-0.56j)]
+    a, b = np.poly(slow + ringing).real, np.poly([0.99984, 0.9976, 0.935, -0.2]).real
+    effects = (BoucWen(), Arx(a=a[1:], b=b * a.sum() / b.sum(), delay=3))
+    model = Model(effects, PERIOD, 10.0, 1e-5)
+    program = compiled(c_program(model, inverse=Inverse(model)), tmp_path)
+    done = subprocess.run([program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+@needs_compiler
 def test_the_inverse_of_a_pole_much_faster_than_a_sample_is_exact(tmp_path):
     model = Model((AmplifierBandwidth(tau=2e-5), BoucWen(), Arx(b=[0.5], delay=1)), 1e-3, 10.0, 1e-5)
     inverse = Inverse(model)
