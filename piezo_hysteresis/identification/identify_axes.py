@@ -53,7 +53,7 @@ class AxisError:
     rms : float
         RMS error about its mean [m].
     percent : float
-        RMS error in per cent of the peak-to-peak displacement of the same samples.
+        RMS error in per cent of the peak-to-peak displacement of the axis over all records.
     """
 
     phase: str
@@ -149,7 +149,7 @@ def axes_errors(model: AxesModel, records: Sequence[Record]) -> list[AxisError]:
     IdentificationError
         If a record has other channels or another sample period than the model, or ends before the model has settled.
     """
-    found = []
+    errors, lows, highs = [], [], []
     for record, u, y in zip(records, *_checked(records), strict=True):
         if (u.shape[1], y.shape[1]) != (model.inputs, model.outputs):
             raise IdentificationError(
@@ -165,11 +165,15 @@ def axes_errors(model: AxesModel, records: Sequence[Record]) -> list[AxisError]:
             raise IdentificationError(
                 f"{record.phase}: got {len(y)} samples, expected more than {first}; record longer"
             )
-        error = (y - model.run(u, model.rest())[0])[first:]
-        for name, e, measured in zip(names(record, "displacement"), error.T, y[first:].T, strict=True):
-            rms, reach = float(e.std()), float(np.ptp(measured))
-            found.append(AxisError(record.phase, name, rms, 100.0 * rms / reach if reach else float("inf")))
-    return found
+        errors.append((y - model.run(u, model.rest())[0])[first:].std(axis=0).tolist())
+        lows.append(y[first:].min(axis=0))
+        highs.append(y[first:].max(axis=0))
+    ranges = (np.max(highs, axis=0) - np.min(lows, axis=0)).tolist()
+    return [
+        AxisError(record.phase, name, rms, 100.0 * rms / reach if reach else float("inf"))
+        for record, own in zip(records, errors, strict=True)
+        for name, rms, reach in zip(names(record, "displacement"), own, ranges, strict=True)
+    ]
 
 
 def _checked(records: Sequence[Record]) -> tuple[list[Array], list[Array]]:

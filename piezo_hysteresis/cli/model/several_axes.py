@@ -115,6 +115,9 @@ def _show(errors: Sequence[AxisError], data: str, json: str | None) -> None:
         ]
         write_json(json, {"schema": 1, "errors": entries})
     rows = tuple((e.phase, e.displacement, f"{e.percent:.3f}", f"{1e9 * e.rms:.1f}") for e in errors)
-    note = "Predicted from the voltages alone; one sensor zero free per phase and displacement."
+    note = (
+        "Predicted from the voltages alone; one sensor zero free per phase and displacement. The range of an axis is "
+        "that over all phases."
+    )
     title = f"Free-run error of several axes{', data ' + data if data else ''}"
     show(Table(title, ("phase", "displacement", "% of range", "nm"), rows, note, frozenset({2, 3})))

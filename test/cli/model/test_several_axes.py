@@ -44,6 +44,18 @@ def test_a_model_of_several_axes_has_a_verdict(piezo, tmp_path):
     assert piezo("validate", tmp_path / "model.npz", whole).status == 0
 
 
+def test_a_rest_before_the_motion_is_not_judged_by_its_noise(piezo, tmp_path):
+    """It was called poor, because its noise is as large as the range of the rest; 0.05 % of that of the stage."""
+    held = dict(np.load(write(tmp_path / "moving.npz")))
+    period, still = held.pop("sample_period"), np.zeros(1000)
+    moving = {name: np.concatenate((still, values)) for name, values in held.items()}
+    moving["displacement"] = moving["displacement"] + 5e-9 * np.random.default_rng(3).normal(size=5000)
+    np.savez(tmp_path / "whole.npz", sample_period=period, **moving)
+    done = piezo("identify", tmp_path / "whole.npz", "-o", tmp_path / "model.npz", "--taps", 20)
+    assert done.status == 0 and any(line.startswith("rest") for line in done.out.splitlines()), done.out
+    assert piezo("validate", tmp_path / "model.npz", tmp_path / "whole.npz").status == 0
+
+
 def test_a_clipped_sensor_makes_it_doubtful(piezo, tmp_path):
     piezo("identify", write(tmp_path / "whole.npz"), "-o", tmp_path / "model.npz", "--taps", 20)
     clipped = write(tmp_path / "clipped.npz", clipped=True)
