@@ -106,7 +106,8 @@ def strike(word, faults, motions):
     with device(word) as (name, parameters, amplifier, (emulated, _)):
         s = WiredSession(name, parameters | {"timeout": 1.0}, amplifier)
         s.start()
-        emulated.faults = type(emulated.faults)([FAULTS[word].parse(fault) for fault in faults])
+        # its motion and its recorder have the same object
+        emulated.faults.__init__([FAULTS[word].parse(fault) for fault in faults])
         for motion, voltage in motions:
             with suppress(PiezoError):  # refused: it has failed, or is under way
                 getattr(Motions(s), motion)(voltage)
