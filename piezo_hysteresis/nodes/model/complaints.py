@@ -49,6 +49,11 @@ class Complaints:
         self._refused = ""
         self.count = 0
 
+    @property
+    def has_problems(self) -> bool:
+        """Whether samples could not be used since the last report."""
+        return bool(self._problems)
+
     def findings(self) -> Iterator[tuple[bytes, str]]:
         """Level and message of what is to be reported now; also that a clock is missing."""
         clock = self._node.get_clock()

@@ -156,10 +156,9 @@ class AxesDiagnostics:
         if silent:
             return
         if not joined:
-            yield (
-                DiagnosticStatus.STALE,
-                f"no samples of the same time, the newest are {joiner.apart:.3g} s apart; set the clocks to one time",
-            )
+            if not self._complaints.has_problems:  # otherwise the samples were refused, whatever the clocks are
+                apart = f"the newest are {joiner.apart:.3g} s apart; set the clocks to one time"
+                yield DiagnosticStatus.STALE, f"no samples of the same time, {apart}"
             return
         if predictor.warming_up:
             yield DiagnosticStatus.WARN, "the model is warming up, because the earlier drive voltages are unknown"
