@@ -110,7 +110,20 @@ class IterativeLearning:
         self.reason = ""
         self.rounds: list[LearningRound] = []
         self._reference = first.wanted.copy()
-        self._expected = first.expected.total
+        self._expected: float | None = None
+
+    @property
+    def expected(self) -> float:
+        """RMS error that `next` is expected to have along the path, as the rounds before predict it [m].
+
+        Raises
+        ------
+        ModelError
+            If learning has ended.
+        """
+        if self.next is None:
+            raise ModelError(f"learning: has ended ({self.reason}), expected no question about a next round")
+        return self.next.expected.total if self._expected is None else self._expected
 
     @property
     def best(self) -> LearningRound:
@@ -146,7 +159,7 @@ class IterativeLearning:
         along = y[played.begin : played.begin + self.wanted.size]
         error = self.wanted - along
         before = self.rounds[-1] if self.rounds else None
-        self.rounds.append(LearningRound(played, along, float(np.sqrt(np.mean(error**2))), self._expected))
+        self.rounds.append(LearningRound(played, along, float(np.sqrt(np.mean(error**2))), self.expected))
         if before is not None and self.rounds[-1].rms >= before.rms:
             self._end("the last round was no better than the one before")
             return None

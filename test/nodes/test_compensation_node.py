@@ -322,6 +322,36 @@ def test_learning_claims_the_stage_and_leaves_it_safe(lab):
     lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")
 
 
+def test_learning_again_corrects_the_same_path_and_says_what_it_expects(lab):
+    """The path of the second learning was the corrected one of the first, which the stage does not have to follow."""
+    wrong = MODEL.with_values({"bouc_wen.p2": 1.05 * MODEL.values()["bouc_wen.p2"]})
+    node = Compensation(lab, wrong, way_back=0.1, learning_rounds=1, sensor_noise=1e-12)
+    rms = lab.listen(Float64, "tracking_rms")
+    node.send(scan())
+    node.until("scan", "done")
+    for _ in range(2):
+        before = len(node.statuses)
+        assert node.ask("learn").success
+        lab.wait(
+            lambda since=before: [s for s in node.statuses[since:] if values_of(s)["state"] in ("done", "failed")],
+            "learning to end",
+        )
+        rounds = {
+            state: [v for v in map(values_of, node.statuses[before:]) if v["state"] == state]
+            for state in ("playing", "learning")
+        }
+        assert [v["expected"] for v in rounds["playing"]] == [v["expected"] for v in rounds["learning"]]
+        last = int(rounds["learning"][-1]["first_index"]) + scan().size
+        lab.wait(lambda end=last: node.samples.newest.index[-1] >= end, "the samples of the last round")
+        samples = node.samples.so_far()
+        for values in rounds["learning"]:
+            at = samples.place() - int(values["first_index"])
+            inside = (at >= 0) & (at < scan().size)
+            error = samples.displacement[inside] - scan()[at[inside]]
+            assert np.sqrt(np.mean(error**2)) == pytest.approx(float(values["rms"]), rel=1e-3)
+        assert rms[-1].data == pytest.approx(float(rounds["learning"][-1]["rms"]), rel=0.2)
+
+
 def test_its_end_leaves_alone_what_another_program_plays(lab):
     node = Compensation(lab)
     lab.send(np.concatenate((np.linspace(0.0, 2.0, 1000), np.full(60_000, 2.0))), "foreign", PERIOD)

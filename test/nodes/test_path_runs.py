@@ -50,7 +50,7 @@ def run(monkeypatch):
     found = SimpleNamespace(
         voltage=drive, predicted=drive, wanted=drive, begin=0, sample_period=PERIOD, expected=expected
     )
-    monkeypatch.setattr(path_runs, "described", lambda found: "")
+    monkeypatch.setattr(path_runs, "described", lambda found, expected: "")
     driver = SimpleNamespace(limits="any", missing="a driver", state="playing", first_index=0, send=lambda phase: None)
     runs = path_runs.PathRuns(driver, SimpleNamespace(show=lambda *arguments, **named: None), {})
     return SimpleNamespace(driver=driver, runs=runs, job=runs._play("path", found))

@@ -154,16 +154,19 @@ class PathRuns:
         reason = f"{1e9 * rms:.1f} nm rms, expected {1e9 * expected:.1f} nm{doubt(tracking.plan)}"
         self._status.show("done", reason, name, first_index=tracking.path_index, rms=rms, expected=expected)
 
-    def _play(self, name: str, found: Plan) -> Generator[None, None, Tracking]:
-        """Send a drive to the driver and collect what the stage does.
+    def _play(
+        self, name: str, found: Plan, learning: IterativeLearning | None = None
+    ) -> Generator[None, None, Tracking]:
+        """Send a drive to the driver and collect what the stage does; `learning` if it is a round of it.
 
         Raises
         ------
         StageError
             If the driver refuses or stops the drive or is no longer there, or no samples arrive.
         """
-        tracking = self.tracking = Tracking(found)
-        self._status.show("playing", described(found), name, expected=found.expected.total)
+        tracking = self.tracking = Tracking(found, None if learning is None else learning.wanted)
+        expected = found.expected.total if learning is None else learning.expected
+        self._status.show("playing", described(found, expected), name, expected=expected)
         self._driver.send(ProtocolPhase(name, found.voltage, found.sample_period))
         # a device that plays from its memory sends nothing before the end
         longest_silence = _STARTED_WITHIN + 2.0 * found.voltage.size * found.sample_period
@@ -220,7 +223,7 @@ class PathRuns:
                 raise StageError(
                     f"the stage is claimed by {printable(self._driver.holder) or 'nobody'}, not by this node"
                 )
-            tracking = yield from self._play(f"{name}_{number}", learning.next)
+            tracking = yield from self._play(f"{name}_{number}", learning.next, learning)
             yield from _in_thread(learning.update, tracking.measured, applied.state)
             now = learning.rounds[-1]
             reason = f"round {number}: {1e9 * now.rms:.1f} nm rms, expected {1e9 * now.expected:.1f} nm"
@@ -230,13 +233,12 @@ class PathRuns:
             )
         if not learning.rounds:
             raise StageError("the trajectory can no longer be reached from the present position of the stage")
-        best, last = learning.best, learning.rounds[-1]
-        self.last = (name, best.plan)
+        last = learning.rounds[-1]
         reason = ", ".join(f"{1e9 * r.rms:.1f}" for r in learning.rounds)
         reason = f"{reason} nm rms in {counted(len(learning.rounds), 'round')}" + (
             f"; {learning.reason}" if learning.reason else ""
         )
-        self._status.show("done", reason, name, rms=last.rms, expected=last.expected, best=best.rms)
+        self._status.show("done", reason, name, rms=last.rms, expected=last.expected, best=learning.best.rms)
 
 
 def _in_thread(compute: Callable[..., Any], *arguments: object) -> Generator[None, None, Any]:

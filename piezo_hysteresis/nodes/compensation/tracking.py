@@ -32,10 +32,12 @@ class Tracking:
     ----------
     plan : Plan
         What is played.
+    wanted : (n,) ndarray, optional
+        Wanted displacement [m]. Default: the path of the plan; a round of learning plays a corrected one.
     """
 
-    def __init__(self, plan: Plan) -> None:
-        self.plan = plan
+    def __init__(self, plan: Plan, wanted: Array | None = None) -> None:
+        self.plan, self._wanted = plan, plan.wanted if wanted is None else wanted
         self.first: int | None = None
         """Index of the first sample of the drive, once the driver has reported it."""
         self.newest_error: float | None = None
@@ -74,7 +76,7 @@ class Tracking:
     def _count_errors(self, begin: int, new: Array) -> None:
         """Add the errors of new samples from drive sample `begin` on; those that are known already are NaN."""
         first = max(self.plan.begin - begin, 0)
-        wanted = self.plan.wanted[begin + first - self.plan.begin :][: max(new.size - first, 0)]
+        wanted = self._wanted[begin + first - self.plan.begin :][: max(new.size - first, 0)]
         errors = wanted - new[first : first + wanted.size]
         errors = errors[np.isfinite(errors)]
         if errors.size:

@@ -60,14 +60,15 @@ def trajectory_to_cloud(displacement: ArrayLike, phase: str, stamp: Time) -> Poi
     return with_phase(to_cloud(columns, {"displacement": "f8"}, stamp), phase)
 
 
-def described(plan: Plan) -> str:
-    """Description of a plan in one line."""
+def described(plan: Plan, learned: float | None = None) -> str:
+    """Description of a plan in one line; `learned` is the error [m] that learning expects of a corrected path."""
     expected = plan.expected
+    total = expected.total if learned is None else learned
     stated = "no free-run error stated" if expected.free_run is None else f"model {1e9 * expected.free_run:.1f} nm"
     return (
         f"{plan.voltage.size * plan.sample_period:.3g} s, {plan.voltage.min():.3g} to {plan.voltage.max():.3g} V, "
-        f"at most {slew_text(plan.largest_slew, 4)}, expected error {1e9 * expected.total:.1f} nm rms "
-        f"(plan {1e9 * expected.planned:.1f} nm, {stated}), "
+        f"at most {slew_text(plan.largest_slew, 4)}, expected error {1e9 * total:.1f} nm rms"
+        + (f" (plan {1e9 * expected.planned:.1f} nm, {stated}), " if total == expected.total else ", ")
         + ("the whole path is reachable" if plan.reachability.is_whole else why_not(plan))
         + doubt(plan)
     )
