@@ -108,6 +108,7 @@ def files(tmp_path_factory, folder):
     )
     (place / "empty.npz").write_bytes(b"")
     (place / "list.json").write_text("[1]")
+    (place / "node.yaml").write_text("driver_node:\n  ros__parameters:\n    stage: simulated\n")
     os.mkfifo(place / "pipe.csv")
     os.mkfifo(place / "zipped.npz")
     t = np.arange(50.0)
@@ -165,6 +166,8 @@ NOBODY = "there is no home folder of that user, expected another path"
         ("simulate -o {place}/s --plant {place}/none.yaml", "expected a YAML file"),
         ("simulate -o {place}/s --plant {list}", "got a list"),
         ("simulate -o {place}/s --plant {fine}", "unknown quantity"),
+        ("simulate -o {place}/s --plant {fine}", "expected names without the heading of a ROS node"),
+        ("diagnose --stage {node} -o {place}/s", "'ros__parameters' under the heading '/**:'"),
         ("simulate -o {place}/s --plant {broken}", "broken YAML"),
         ("simulate -o {place}/s --noise -1", "sensor.noise"),
         ("simulate -o {place}/s --sample-period 1", "sample period"),

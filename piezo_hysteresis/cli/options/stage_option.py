@@ -119,7 +119,8 @@ def diagnose_stage(args: argparse.Namespace) -> LiveDiagnosis:
 def _settings(path: Path) -> tuple[DriverSettings, dict[str, Any]]:
     """Those of the stage of a parameter file of the driver, or of a simulated one of plant parameters."""
     content = read_yaml(path)
-    if isinstance(content, Mapping) and "/**" in content:
+    nodes = content if isinstance(content, Mapping) else {}
+    if "/**" in nodes or any(isinstance(node, Mapping) and "ros__parameters" in node for node in nodes.values()):
         return read_stage(path)
     given = {"stage": "simulated", "simulated.plant_file": str(path), "real_time_factor": FASTEST}
     return checked_settings(given, path)

@@ -113,7 +113,9 @@ def read_stage(path: Path) -> tuple[DriverSettings, dict[str, Any]]:
     given = content.get("/**") if isinstance(content, Mapping) else None
     parameters = given.get("ros__parameters") if isinstance(given, Mapping) else None
     if not isinstance(parameters, Mapping):
-        raise ParameterError(f"{path}: got no '/**: ros__parameters:', expected a parameter file of the driver")
+        raise ParameterError(
+            f"{path}: got no 'ros__parameters' under the heading '/**:', expected a parameter file of the driver"
+        )
     return checked_settings(_flat(parameters), path)
 
 

@@ -145,6 +145,8 @@ class PlantParameters:
                 expected = f"part.quantity, part: {', '.join(_GROUPS)}"
                 if known:
                     expected = f"one of {', '.join(f'{part}.{name}' for name in sorted(known))}"
+                elif "ros__parameters" in name.split("."):
+                    expected = "names without the heading of a ROS node, e.g. 'creep.gamma: 0.015'"
                 raise ParameterError(f"{name!r}: unknown quantity of the simulated stage, expected {expected}")
             changes.setdefault(part, {})[quantity] = value
         parts = {part: replace(getattr(self, part), **new) for part, new in changes.items()}
