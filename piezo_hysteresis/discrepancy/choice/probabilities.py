@@ -55,7 +55,7 @@ def probabilities(found: Diagnosis, effects: Collection[str], unplayed: Collecti
     -------
     dict of str to float
         Probability by explanation; they sum to one. Several effects together are one explanation, e.g.
-        ``"creep + backlash"``.
+        ``"creep + backlash"``. ``"creep + none of these"`` is creep and an effect that is not in the catalogue.
     """
     prior = {NOTHING: PRIOR_NOTHING, NONE_OF_THESE: PRIOR_NONE}
     prior |= dict.fromkeys(sorted(effects), (1.0 - PRIOR_NOTHING - PRIOR_NONE) / max(len(effects), 1))
@@ -73,23 +73,27 @@ def probabilities(found: Diagnosis, effects: Collection[str], unplayed: Collecti
         last = step is selection.steps[-1]
         if not step.accepted and not (last and not so_far):
             continue
-        shares = step_probabilities(step, prior, selection.null)
-        kept = step.best.effect.public_name() if step.accepted else None
+        later = {s.best.effect.public_name() for s in selection.accepted[len(so_far) + 1 :]}
+        shares = step_probabilities(step, prior, selection.null, selection.score if later else None)
+        kept = {step.best.effect.public_name(), *later} if step.accepted else set()
         for name, share in shares.items():
-            if name != kept:
-                label = " + ".join((*so_far, name)) if name in effects else NONE_OF_THESE
+            if name not in kept:
+                known = name in effects or found.verdict is Verdict.NAMED
+                label = " + ".join((*so_far, name)) if known else NONE_OF_THESE
                 label = (" + ".join(so_far) or NOTHING) if name == NOTHING else label
                 total[label] = total.get(label, 0.0) + weight * share
-        if kept is not None:
-            weight *= shares[kept]
-            so_far = (*so_far, kept)
+        if kept:
+            weight *= sum(shares.get(name, 0.0) for name in kept)  # the same effects, in whatever order they are added
+            so_far = (*so_far, step.best.effect.public_name())
     if so_far:
         label = " + ".join(so_far) if found.verdict is Verdict.NAMED else NONE_OF_THESE
         total[label] = total.get(label, 0.0) + weight
     return _to_one(total)
 
 
-def step_probabilities(step: Step, prior: Mapping[str, float], null: float) -> dict[str, float]:
+def step_probabilities(
+    step: Step, prior: Mapping[str, float], null: float, reached: Score | None = None
+) -> dict[str, float]:
     """Probability of every explanation in one step of the search.
 
     Parameters
@@ -100,20 +104,28 @@ def step_probabilities(step: Step, prior: Mapping[str, float], null: float) -> d
         Prior probabilities of the candidates and of the two other explanations.
     null : float
         V of a perfect model.
+    reached : Score, optional
+        Score after the last step, if more effects were added after this one. An effect of this step does not have to
+        explain the gap alone, so *nothing* and *none of these* are compared with all effects together.
     """
-    scores: dict[str, Score] = {NOTHING: tolerant(step.before), NONE_OF_THESE: part_explained(step.before, null)}
+    others: dict[str, Score] = {NOTHING: tolerant(step.before), NONE_OF_THESE: part_explained(step.before, null)}
+    scores = {} if reached is not None else dict(others)
     for candidate in step.tried:
         name = candidate.effect.public_name()
         if name not in scores or candidate.score.cost < scores[name].cost:
             scores[name] = candidate.score
     equals = set(step.confusable_with)
     best = min(scores, key=lambda name: scores[name].cost)
-    logs = {}
+    behind = {}
     for name, score in scores.items():
-        distance = log_odds(scores[best], score)
+        behind[name] = log_odds(scores[best], score)
         if name in equals:
-            distance = min(distance, scatter_odds(scores[best], score))
-        logs[name] = np.log(prior.get(name, min(prior.values()))) - distance
+            behind[name] = min(behind[name], scatter_odds(scores[best], score))
+    if reached is not None:
+        leader = min((reached, *others.values()), key=lambda score: score.cost)
+        behind = {name: distance + log_odds(leader, reached) for name, distance in behind.items()}
+        behind |= {name: log_odds(leader, score) for name, score in others.items()}
+    logs = {name: np.log(prior.get(name, min(prior.values()))) - distance for name, distance in behind.items()}
     top = max(logs.values())
     return _to_one({name: float(np.exp(value - top)) for name, value in logs.items()})
 

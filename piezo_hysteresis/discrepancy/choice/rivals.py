@@ -40,9 +40,9 @@ def rivals_of(found: Diagnosis | None, probabilities: Mapping[str, float], error
     if found is None or found.selection is None or not found.selection.steps:
         return []
     likely = {name for name, p in probabilities.items() if p >= error_rate}
-    if likely & {NOTHING, NONE_OF_THESE}:
-        return []
     last = {name.split(" + ")[-1] for name in likely}
+    if last & {NOTHING, NONE_OF_THESE}:
+        return []
     steps = found.selection.steps
     step = next((s for s in steps if len(last & {c.effect.public_name() for c in s.tried}) > 1), steps[0])
     fitted: dict[str, FittedCandidate] = {}

@@ -15,6 +15,7 @@
 """Probabilities of the explanations, and the next drive."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from piezo_hysteresis.discrepancy.choice.probabilities import (
     NONE_OF_THESE,
     NOTHING,
     log_odds,
+    probabilities,
     scatter_odds,
     step_probabilities,
 )
@@ -37,8 +39,9 @@ from piezo_hysteresis.discrepancy.choice.time_to_decide import (
     z_of,
 )
 from piezo_hysteresis.discrepancy.search.candidates import Candidate, FittedCandidate
-from piezo_hysteresis.discrepancy.search.selection_result import Step
+from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
+from piezo_hysteresis.discrepancy.verdict import Verdict
 from piezo_hysteresis.effects import Arx, Backlash, BoucWen, Creep, MainsHum, ThermalDrift
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.cross_validation import Score
@@ -106,6 +109,32 @@ def test_an_error_below_the_floor_is_not_evidence():
 def test_an_effect_that_explains_too_little_is_less_likely_than_none_of_these():
     told = step_probabilities(turn([10.0] * 8, (Creep, [7.0] * 8), (Backlash, [8.0] * 8)), PRIOR, 1.0)
     assert next(iter(told)) == NONE_OF_THESE
+
+
+class Found(NamedTuple):
+    """What the probabilities read of a diagnosis."""
+
+    selection: Selection
+    verdict: Verdict
+
+
+def two_steps(after):
+    """Creep explains half of the gap, and backlash what then remains, down to `after`; either may come first."""
+    first = turn([10.0] * 8, (Creep, [5.0] * 8), (Backlash, [5.2] * 8), (MainsHum, [9.0] * 8))
+    steps = (first, turn([5.0] * 8, (Backlash, [after] * 8), (MainsHum, [4.9] * 8)))
+    return Found(Selection(STAGE, STAGE, steps[-1].best.score, steps, 1.0), Verdict.NAMED)
+
+
+def test_two_effects_that_leave_the_noise_are_likelier_than_none_of_these():
+    told = probabilities(two_steps(1.0), set(PRIOR) - {NOTHING, NONE_OF_THESE})
+    assert next(iter(told)) == "creep + backlash"
+    assert told["creep + backlash"] > 0.99
+    assert sum(told.values()) == pytest.approx(1.0)
+
+
+def test_what_is_missing_beside_a_named_effect_does_not_deny_the_effect():
+    told = probabilities(two_steps(2.0), set(PRIOR) - {NOTHING, NONE_OF_THESE})
+    assert next(iter(told)) == "creep + none of these"
 
 
 def test_a_lead_that_changes_its_sign_between_records_is_chance():
