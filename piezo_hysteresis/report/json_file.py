@@ -23,6 +23,7 @@ from typing import Any
 
 from ..errors import RecordingError
 from ..home_path import in_home
+from ..recording.whole_file import whole_file
 from ..yaml_file import read_regular_file
 
 
@@ -40,9 +41,8 @@ def write_json(path: str, answer: Mapping[str, Any]) -> None:
         if place.exists() and not place.is_file():  # a pipe or /dev/stdout cannot be replaced
             place.write_text(text, encoding="utf-8")
             return
-        draft = place.with_name(place.name + ".tmp")
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(place)
+        with whole_file(place) as draft:
+            draft.write_text(text, encoding="utf-8")
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}, expected a file that can be written") from None
 

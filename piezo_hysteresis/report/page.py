@@ -23,6 +23,7 @@ from typing import Any
 
 from ..errors import RecordingError
 from ..identification.fit.fit import Fit
+from ..recording.whole_file import whole_file
 from .document import document
 from .figures.bode import bode
 from .figures.comparison import ModelComparison
@@ -84,7 +85,8 @@ class Page:
         folder = path.with_name(f"{path.stem}_figures")
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            path.write_text(self.html, encoding="utf-8")
+            with whole_file(path) as draft:
+                draft.write_text(self.html, encoding="utf-8")
             for drawing in self.drawings:
                 drawing.save(folder)
         except OSError as error:
