@@ -38,6 +38,10 @@ FORMAT = 3
 FEWEST_SCORES = 60
 """Fewest scores of one class from which its scatter can be estimated."""
 
+FEWEST_INDEPENDENT = 8.0
+"""Fewest independent scores of one class. With fewer, Student's t of the threshold blinds the watch: with 8, a change
+has to be 4 times as large as with very many, and with 2.5 it was 8000 times."""
+
 CLASS_RATIO = 4.0
 """Width of a class: the spans of the drives of one class differ by at most this factor, and so do their speeds."""
 
@@ -72,7 +76,7 @@ class Baseline:
 
     @classmethod
     def of(cls, scores: Sequence[ChangeScore], model: str = "", sample_period: float = 0.0) -> Baseline:
-        """Baseline of a series of scores; classes with too few of them are left out.
+        """Baseline of a series of scores; classes with too few of them, or too few independent ones, are left out.
 
         Raises
         ------
@@ -90,7 +94,14 @@ class Baseline:
                 f"baseline: got {len(most)} blocks{each} under one kind of drive, expected at least {FEWEST_SCORES}; "
                 "drive the stage as in normal use for longer"
             )
-        return cls(known, model, sample_period)
+        certain = {key: scatter for key, scatter in known.items() if scatter.independent >= FEWEST_INDEPENDENT}
+        if not certain:
+            largest = max(scatter.independent for scatter in known.values())
+            raise ModelError(
+                f"baseline: its scores drift and are worth {largest:.1f} independent ones, expected at least "
+                f"{FEWEST_INDEPENDENT:g}; take one over a longer baseline_time, with the stage warm"
+            )
+        return cls(certain, model, sample_period)
 
     def of_model(self, model: str) -> Baseline:
         """The same scatter with the hash of another model, which may differ only in a few recalibrated parameters."""

@@ -67,6 +67,14 @@ def follow(drive, displacement, seed=0, baseline=None, noise=5e-4, model=MODEL):
     return watch, largest
 
 
+def play(predictor, watch, drive, measured):
+    """Give a stream to the watch, block by block."""
+    for first in range(0, drive.size - BLOCK + 1, BLOCK):
+        part = slice(first, first + BLOCK)
+        answer = predictor.predict(first, round(first * PERIOD * 1e9), drive[part], measured[part])
+        watch.add(drive[part], answer, predictor, round((first + BLOCK) * PERIOD * 1e9))
+
+
 def run(model, drive):
     return model.run(drive, model.rest(drive[0]))[0]
 
@@ -124,6 +132,19 @@ def test_the_mean_of_a_class_is_as_uncertain_as_its_own_scores_make_it():
         change = detector.add(score)
     expected = (1.0 + (3.0**2 / 10_000 + 1.0 / 100) / 4.0) / 4.0
     assert change.deviation**2 == pytest.approx(expected)
+
+
+def test_a_drift_during_the_baseline_is_no_reason_to_be_blind():
+    """The gain grew by 0.15 % in a baseline of 15 s. Then a gain 0.5 % higher was no change: the threshold was 10⁹."""
+    drive = sine(40.0, 0.5) * (0.8 + 0.2 * sine(40.0, 0.1, 1.0) / 4.5)
+    drifting = run(MODEL, drive) * (1.0 + 1e-4 * PERIOD * np.arange(drive.size))
+    rng = np.random.default_rng(5)
+    measured = drifting + 5e-4 * SPAN * rng.standard_normal(drive.size)
+    predictor, watch = Predictor(PERIOD, MODEL), ChangeWatch(86400.0)
+    watch.take_baseline(15.0)
+    with pytest.raises(ModelError, match=r"worth .* independent ones, expected at least 8"):
+        play(predictor, watch, drive, measured)
+    assert watch.baseline is None
 
 
 @pytest.mark.parametrize("group", ["gain", "loop", "dynamics", "offset"])
