@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -97,22 +97,13 @@ def split_at_gaps(
     for name, values in channels.items():
         if values.shape != voltage.shape:
             raise RecordError(f"{name}: got {values.size} samples, expected {voltage.size} as in voltage")
-    notices = []
-    kept = {}
-    for name in channels.keys() - {"voltage", "displacement"}:
-        if (np.abs(channels[name]) < LARGEST).all():
-            kept[name] = channels[name]
-        else:
-            text = f"{name} has non-finite samples; the channel was left out"
-            notices.append(Notice("non_finite", text, phase, severe=axis_of(name) is not None))
     if not PERIODS[0] <= sample_period <= PERIODS[1]:
         raise RecordError(f"`sample_period`: got {sample_period:g} s, expected {PERIODS[0]:g} to {PERIODS[1]:g} s")
-    channels = {name: values for name, values in channels.items() if name in kept or name in _NEEDED}
-    rows, breaks, pauses = with_missing_rows(
-        {**channels, _ROW: np.arange(float(voltage.size))}, breaks or {}, pauses or {}
-    )
+    further, notices = _complete(channels, phase)
+    given = {**{name: channels[name] for name in _NEEDED}, **further, _ROW: np.arange(float(voltage.size))}
+    rows, breaks, pauses = with_missing_rows(given, breaks or {}, pauses or {})
     voltage, displacement = (np.where(np.abs(rows[c]) < LARGEST, rows[c], np.nan) for c in _NEEDED)
-    kept = {name: np.interp(np.arange(voltage.size), *_measured(rows[name])) for name in kept}
+    further = {name: np.interp(np.arange(voltage.size), *_measured(rows[name])) for name in further}
     gaps = {**breaks, **pauses}
     edges = sorted(gaps.keys() - {0})
     begin = float(labels.pop("start_time", 0.0))
@@ -125,32 +116,23 @@ def split_at_gaps(
     short = [gap for gap in joined(segments(lost)) if not _has_edge(gap, edges)]
     voltage, displacement, closed = filled(voltage, displacement, short)
     good = np.isfinite(voltage) & np.isfinite(displacement)
-    pieces = [(a + i, a + j) for a, b in _between(edges, good.size) for i, j in segments(good[a:b])]
-    if not pieces:
+    found = [(a + i, a + j) for a, b in _between(edges, good.size) for i, j in segments(good[a:b])]
+    if not found:
         raise RecordError(f"phase '{phase}': got no finite sample among {good.size}")
-    shortest = min(SHORTEST_SHARE * good.size, max(b - a for a, b in pieces))
+    shortest = min(SHORTEST_SHARE * good.size, max(b - a for a, b in found))
     known = {
         a
-        for (begun, end), (a, _) in zip(pieces, pieces[1:], strict=False)
+        for (begun, end), (a, _) in zip(found, found[1:], strict=False)
         if end - begun >= shortest
         and ((end == a and a in pauses) or is_held(voltage, (end, a), a - end + gaps.get(a, 0)))
     }
-    pieces = [(a, b) for a, b in pieces if b - a >= shortest]
-    recorded = np.isfinite(rows[_ROW])
-    dropped = int(np.count_nonzero(recorded)) - sum(int(np.count_nonzero(recorded[a:b])) for a, b in pieces)
-    if bad := int(np.count_nonzero(recorded & ~good)):
-        text = f"{bad} of {good.size} samples are not finite and were dropped"
-        notices.append(Notice("non_finite", text, phase, severe=bad > good.size // 2))
+    pieces = [(a, b) for a, b in found if b - a >= shortest]
+    notices += _dropped(np.isfinite(rows[_ROW]), good, pieces, phase)
     if closed:
         samples = sum(int(np.count_nonzero(lost[a:b])) for a, b in closed)
         at = ", ".join(f"{time_of(a):.6g} s" for a, _ in closed[:3]) + (", …" if len(closed) > 3 else "")
         text = f"{samples} lost samples were interpolated, because the channels are smooth there (at {at})"
         notices.append(Notice("interpolated", text, phase))
-    if dropped > bad:
-        text = f"{dropped - bad} samples between closely spaced gaps were dropped"
-        notices.append(Notice("split", text, phase, severe=dropped > good.size // 2))
-    if len(pieces) > 1:
-        notices.append(Notice("split", f"the phase was split at its gaps into {len(pieces)} records", phase))
     records: list[Record] = []
     for a, b in pieces:
         if a > 0:
@@ -159,11 +141,38 @@ def split_at_gaps(
                 "truncated": a not in known,
                 "initial_voltage": None,
             }
-        others = {name: values[a:b] for name, values in kept.items()}
+        others = {name: values[a:b] for name, values in further.items()}
         records.append(
             Record(voltage[a:b], displacement[a:b], sample_period, start_time=time_of(a), channels=others, **labels)
         )
     return records, notices
+
+
+def _complete(channels: Mapping[str, Samples], phase: str) -> tuple[dict[str, Samples], list[Notice]]:
+    """The channels beside voltage and displacement that have no gap, and notices about the others."""
+    complete, notices = dict[str, Samples](), list[Notice]()
+    for name in (name for name in channels if name not in _NEEDED):
+        if (np.abs(channels[name]) < LARGEST).all():
+            complete[name] = channels[name]
+        else:
+            text = f"{name} has non-finite samples; the channel was left out"
+            notices.append(Notice("non_finite", text, phase, severe=axis_of(name) is not None))
+    return complete, notices
+
+
+def _dropped(
+    recorded: NDArray[np.bool_], good: NDArray[np.bool_], pieces: list[tuple[int, int]], phase: str
+) -> Iterator[Notice]:
+    """What was dropped of the samples that were recorded, and into how many pieces they were split."""
+    dropped = int(np.count_nonzero(recorded)) - sum(int(np.count_nonzero(recorded[a:b])) for a, b in pieces)
+    if bad := int(np.count_nonzero(recorded & ~good)):
+        text = f"{bad} of {good.size} samples are not finite and were dropped"
+        yield Notice("non_finite", text, phase, severe=bad > good.size // 2)
+    if dropped > bad:
+        text = f"{dropped - bad} samples between closely spaced gaps were dropped"
+        yield Notice("split", text, phase, severe=dropped > good.size // 2)
+    if len(pieces) > 1:
+        yield Notice("split", f"the phase was split at its gaps into {len(pieces)} records", phase)
 
 
 def _between(edges: list[int], size: int) -> list[tuple[int, int]]:
