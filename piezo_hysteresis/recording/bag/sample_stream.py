@@ -76,7 +76,7 @@ class SampleStream:
         self._next = int(index[-1]) + 1
         self._index.extend(index)
         self._phase.extend(block.phase)
-        for name in self._channels.keys() | block.channels.keys():
+        for name in dict.fromkeys((*self._channels, *block.channels)):
             if name not in self._channels:
                 self._channels[name] = Column(np.float64)
                 self._channels[name].fill(np.nan, begin)

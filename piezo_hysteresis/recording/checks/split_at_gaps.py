@@ -151,7 +151,7 @@ def split_at_gaps(
 def _complete(channels: Mapping[str, Samples], phase: str) -> tuple[dict[str, Samples], list[Notice]]:
     """The channels beside voltage and displacement that have no gap, and notices about the others."""
     complete, notices = dict[str, Samples](), list[Notice]()
-    for name in (name for name in channels if name not in _NEEDED):
+    for name in (n for n in channels if n not in _NEEDED):
         if (np.abs(channels[name]) < LARGEST).all():
             complete[name] = channels[name]
         else:
