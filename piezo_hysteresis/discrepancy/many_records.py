@@ -19,6 +19,8 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 
+import numpy as np
+
 from ..errors import DivergenceError
 from ..identification.fit.fit import Fit
 from ..identification.fit.form_uncertainty import with_alternative, with_form_uncertainty
@@ -60,8 +62,9 @@ def diagnose_many(state: DiagnosisState) -> Diagnosis:
     """Fit the baseline, add the missing effects, and conclude.
 
     The error of an explicit step is subtracted if the user asked for it, otherwise the data have no verdict: before the
-    search only if nothing else is missing, after it with the first effects with which the data show it. The search is
-    repeated if time is left and the model that was found corrects averaged samples differently.
+    search only if nothing else is missing, after it with the first effects with which the data show it, if it explains
+    them better than all effects that were found. The search is repeated if time is left and the model that was found
+    corrects averaged samples differently.
     """
     setup = _baseline(state)
     explicit = None
@@ -70,7 +73,8 @@ def diagnose_many(state: DiagnosisState) -> Diagnosis:
     selection = _search(state, setup) if explicit is None else None
     if selection is not None and selection.in_time:
         bests = (s.best for s in selection.accepted if s.best.score.excess > ADEQUATE)
-        models = (explicit_model(best.fit.model, best.training_data) for best in bests)
+        reached = selection.accepted[-1].best.fit.cost if selection.accepted else np.inf
+        models = (explicit_model(best.fit.model, best.training_data, reached) for best in bests)
         explicit = next((model for model in models if model is not None), None)
     if explicit is not None:
         if not state.explicit_step:
