@@ -34,7 +34,7 @@ SHOWN = 0.005
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
 """Smallest number of mains periods in a record, longest sample period in mains periods, smallest number of records."""
 STEADY = 0.3
-"""Smallest ratio of the quartiles of the amplitude of hum."""
+"""Smallest ratio of the quartiles of the amplitude of hum, and of the median to the mean of its gain."""
 UNCERTAIN = 0.05
 """Probability of a size at least as large without the effect, up to which the effect is certain."""
 
@@ -45,7 +45,7 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
     if gain < LEAST_GAIN:
         lowers = f"lowers mean ln R² by {gain:.2f}" if gain >= SHOWN else "does not lower mean ln R²"
         return Rejection(best.name, f"in cross-validation it {lowers}, and a decrease by {LEAST_GAIN:g} is needed")
-    if best.name == MainsHum.name and not is_steady(best):
+    if best.name == MainsHum.name and not (is_steady(best) and gains_in_most(best, before)):
         return Rejection(best.name, "its amplitude depends on the drive, which mains hum does not")
     alone = without(best)
     owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
@@ -82,21 +82,34 @@ def is_steady(hum: FittedCandidate) -> bool:
     Hum is free in every record, also in those that cross-validation leaves out. It can take up what another effect
     leaves at the mains frequency and its harmonics.
     """
-    data, frequency = hum.training_data, hum.effect["f"]
+    data = hum.training_data
     lines = 2 * data.free_with(hum.fit.model).harmonics
     found = [
         np.hypot(free[-lines::2], free[1 - lines :: 2])
-        for record, floor, free in zip(data.records, data.floors, hum.fit.nuisances, strict=True)
-        if np.isfinite(floor)
-        and free.size >= lines
-        and record.duration * frequency >= PERIODS
-        and record.sample_period * frequency <= RESOLVED
+        for free, resolved in zip(hum.fit.nuisances, _resolve(hum), strict=True)
+        if resolved and free.size >= lines
     ]
     if len(found) < FEWEST:
         return True
     strongest = np.array(found)[:, np.argmax(np.mean(np.square(found), axis=0))]
     low, high = np.quantile(strongest, (0.25, 0.75))
     return bool(low > STEADY * high)
+
+
+def gains_in_most(hum: FittedCandidate, before: Score) -> bool:
+    """Whether hum also lowers the error of a typical record, and not only of those with a drive at its harmonics."""
+    counted = np.isfinite(hum.training_data.floors)
+    gains = (before.logs - hum.score.logs)[np.array(_resolve(hum))[counted]]
+    return bool(gains.size < FEWEST or np.median(gains) > STEADY * (before.cost - hum.score.cost))
+
+
+def _resolve(hum: FittedCandidate) -> list[bool]:
+    """Whether each record is long enough and fast enough to show hum."""
+    data, frequency = hum.training_data, hum.effect["f"]
+    return [
+        bool(np.isfinite(floor)) and r.duration * frequency >= PERIODS and r.sample_period * frequency <= RESOLVED
+        for r, floor in zip(data.records, data.floors, strict=True)
+    ]
 
 
 def bends_all_along(candidate: FittedCandidate) -> bool:

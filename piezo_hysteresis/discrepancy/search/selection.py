@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 from ...effects import CATALOGUE, Effect
 from ...identification.fit.cross_validation import Score
@@ -39,10 +40,11 @@ from .candidate_refits import (
     refit_candidates,
     refits_behind_new_dynamics,
     refits_of_twins,
+    settled,
     simplest,
 )
 from .candidates import BY_COST, Candidate, FittedCandidate, screen
-from .refit import LATER, refit, without
+from .refit import LATER, Fitted, collected, refit, without
 from .selection_result import Rejection, Selection, Step
 from .training_data import TrainingData
 
@@ -85,7 +87,7 @@ def select(
             steps.append(step)
             if not step.accepted:
                 break
-            steps = needed(steps)
+            steps = in_best_laws(needed(steps), effects)
             best = steps[-1].best
             now, reached, data = best.fit.model, best.score, best.training_data
         steps = certain(steps)
@@ -96,15 +98,23 @@ def select(
 
 
 def certain(steps: Sequence[Step]) -> list[Step]:
-    """The steps without the last effects as long as their intervals do not exclude that they are absent.
+    """The steps without the effects whose intervals, beside all others, do not exclude that they are absent.
 
     Only the last model shows this: while an effect is missing, the misfit makes the intervals of others wide.
     """
     kept = list(steps)
-    while (accepted := [step for step in kept if step.accepted]) and not is_certain(accepted[-1].best):
-        last = accepted[-1]
-        rejected = Rejection(last.best.name, "its interval does not exclude that it is absent")
-        kept = [*accepted[:-1], replace(last, accepted=False, rivals=(), rejected=(rejected, *last.rejected))]
+    while accepted := [step for step in kept if step.accepted]:
+        doubtful = (step for step in reversed(accepted) if not is_certain(_beside_newest(step, accepted)))
+        if (step := next(doubtful, None)) is None:
+            break
+        rejected = Rejection(step.best.name, "its interval does not exclude that it is absent")
+        if step is accepted[-1]:
+            kept = [*accepted[:-1], replace(step, accepted=False, rivals=(), rejected=(rejected, *step.rejected))]
+            continue
+        fewer = _taken_back(step, accepted, without(_beside_newest(step, accepted)), rejected)
+        if fewer is None:
+            break
+        kept = [*fewer, *kept[len(accepted) :]]
     return kept
 
 
@@ -112,21 +122,58 @@ def needed(accepted: Sequence[Step]) -> list[Step]:
     """The steps without those whose effects the newest one makes superfluous."""
     steps = list(accepted)
     for step in accepted[:-1]:
-        newest = steps[-1].best
-        earlier = replace(newest, effect=newest.fit.model[step.best.name])
+        newest, earlier = steps[-1].best, _beside_newest(step, steps)
         if is_certain(earlier):
             continue
         alone = without(earlier)
         if alone is None or alone.score.cost - newest.score.cost >= LEAST_GAIN:
             continue
-        best = refit(alone.model.without(newest.name), replace(newest, effect=alone.model[newest.name]), LATER)
-        if best is None:
+        reason = f"beside {newest.name}, its interval does not exclude that it is absent"
+        steps = _taken_back(step, steps, alone, Rejection(earlier.name, reason)) or steps
+    return steps
+
+
+def in_best_laws(accepted: Sequence[Step], effects: Collection[type[Effect]]) -> list[Step]:
+    """The steps with every earlier effect in the law that is best beside the newest one, as long as an error remains.
+
+    The law was chosen when the newest effect was missing, and may have imitated a part of it.
+    """
+    steps = list(accepted)
+    for place, step in enumerate(accepted[:-1]):
+        newest, now = steps[-1].best, _beside_newest(step, steps)
+        laws = [e for e in effects if e.public_name() == now.effect.public_name() and e.name != now.name]
+        if not laws or not leaves_room(newest.score):
             continue
-        place = steps.index(step)
-        steps[place + 1] = replace(steps[place + 1], before=step.before)
-        del steps[place]
-        rejected = Rejection(earlier.name, f"beside {best.name}, its interval does not exclude that it is absent")
-        steps[-1] = replace(steps[-1], best=best, rejected=(*steps[-1].rejected, rejected))
+        rest = newest.fit.model.without(now.name)
+        first = collected(partial(refit, rest, max_iterations=LATER), screen(rest, newest.training_data, laws))
+        best = simplest(_best_of_each([now, *collected(partial(settled, before=step.before), first)]))
+        alone = refit(step.best.fit.model.without(now.name), best, LATER) if best is not now else None
+        if alone is not None:
+            steps[place] = replace(step, best=alone)
+            steps[place + 1] = replace(steps[place + 1], before=alone.score)
+            steps[-1] = replace(steps[-1], best=replace(best, effect=best.fit.model[newest.name]))
+    return steps
+
+
+def _beside_newest(step: Step, accepted: Sequence[Step]) -> FittedCandidate:
+    """The effect of a step in the newest model, which contains all effects."""
+    newest = accepted[-1].best
+    return replace(newest, effect=newest.fit.model[step.best.name])
+
+
+def _taken_back(step: Step, accepted: Sequence[Step], alone: Fitted | None, rejected: Rejection) -> list[Step] | None:
+    """The accepted steps without an earlier one, from the newest model without its effect; None without a fit."""
+    newest = accepted[-1].best
+    if alone is None:
+        return None
+    best = refit(alone.model.without(newest.name), replace(newest, effect=alone.model[newest.name]), LATER)
+    if best is None:
+        return None
+    steps = list(accepted)
+    place = steps.index(step)
+    steps[place + 1] = replace(steps[place + 1], before=step.before)
+    del steps[place]
+    steps[-1] = replace(steps[-1], best=best, rejected=(*steps[-1].rejected, rejected))
     return steps
 
 

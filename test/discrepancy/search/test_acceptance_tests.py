@@ -20,7 +20,12 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy.search import acceptance_tests
-from piezo_hysteresis.discrepancy.search.acceptance_tests import bends_all_along, first_rejection, is_steady
+from piezo_hysteresis.discrepancy.search.acceptance_tests import (
+    bends_all_along,
+    first_rejection,
+    gains_in_most,
+    is_steady,
+)
 from piezo_hysteresis.discrepancy.search.candidate_refits import simplest
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.refit import Fitted
@@ -100,6 +105,19 @@ def test_hum_has_the_same_amplitude_whatever_the_drive_does(amplitudes, steady):
     free = tuple(np.array([0.0, a, 0.0, 0.7, 0.0, 0.6, 0.0]) for a in amplitudes)
     hum = replace(hum, training_data=data, fit=replace(hum.fit, nuisances=free))
     assert is_steady(hum) is steady
+
+
+@pytest.mark.parametrize(
+    ("left", "mains"),
+    [((1.9, 1.6, 2.4, 1.4, 2.1), True), ((3.1, 3.2, 1.2, 1.5, 3.0), False)],
+    ids=["mains", "two drives"],
+)
+def test_hum_lowers_the_error_of_most_records_whatever_the_drive_does(left, mains):
+    """Beside a rate law of another form, hum was named from sines of 50 and 150 Hz, with 0.18 for the mean of all."""
+    hum = fitted(MainsHum(), (), np.empty((0, 0)))
+    data = TrainingData((Record(np.zeros(1000), np.zeros(1000), 1e-3),) * 5, np.ones(5), EXTENT)
+    hum = replace(hum, training_data=data, score=scored(*left))
+    assert gains_in_most(hum, scored(3.1, 3.2, 3.3, 3.1, 3.0)) is mains
 
 
 @pytest.mark.parametrize(("corner", "curve"), [(0.1, False), (4.0, False), (30.0, True)])
