@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import chdtri
 
-from ...effects import AmplifierSaturation, MainsHum
+from ...effects import MainsHum
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.form_uncertainty import with_form_uncertainty
 from ...identification.records.noise_floor import ADEQUATE, stroke
@@ -110,9 +110,3 @@ def _resolve(hum: FittedCandidate) -> list[bool]:
         bool(np.isfinite(floor)) and r.duration * frequency >= PERIODS and r.sample_period * frequency <= RESOLVED
         for r, floor in zip(data.records, data.floors, strict=True)
     ]
-
-
-def bends_all_along(candidate: FittedCandidate) -> bool:
-    """Whether a limit bends over more than the whole drive range, so that it is a curve and not a limit."""
-    saturates = candidate.name == AmplifierSaturation.name
-    return saturates and candidate.effect["corner"] > candidate.training_data.extent.span

@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
+from ...effects import AmplifierSaturation
 from ...effects.effect import ChainPosition
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Progress
@@ -154,3 +155,15 @@ def simplest(refits: list[FittedCandidate]) -> FittedCandidate:
         return lead < TIE or (is_law and lead < 2.0 * error)
 
     return min(filter(is_tie, refits), key=lambda c: (len(c.fit.names), c.score.cost))
+
+
+def best_of_each(refits: list[FittedCandidate]) -> list[FittedCandidate]:
+    """The best refit of every effect, best first; a limit that bends all along the drive is a curve and not a limit."""
+    worst_first = sorted((c for c in refits if not bends_all_along(c)), key=BY_COST, reverse=True)
+    return sorted({c.name: c for c in worst_first}.values(), key=BY_COST)
+
+
+def bends_all_along(candidate: FittedCandidate) -> bool:
+    """Whether a limit bends over more than the whole drive range, so that it is a curve and not a limit."""
+    saturates = candidate.name == AmplifierSaturation.name
+    return saturates and candidate.effect["corner"] > candidate.training_data.extent.span

@@ -21,8 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from functools import partial
 
 from ...effects import CATALOGUE, Effect
 from ...identification.fit.cross_validation import Score
@@ -31,20 +29,20 @@ from ...identification.fit.normal_equations import residuals
 from ...identification.fit.time_limit import TimeSpentError
 from ...identification.records.noise_floor import ADEQUATE
 from ...model.model import Model
-from .acceptance_tests import bends_all_along, first_rejection, is_certain
+from .acceptance_tests import first_rejection
 from .candidate_refits import (
     CLOSE,
     LEAST_GAIN,
+    best_of_each,
     finest,
     leaves_room,
     refit_candidates,
     refits_behind_new_dynamics,
     refits_of_twins,
-    settled,
     simplest,
 )
-from .candidates import BY_COST, Candidate, FittedCandidate, screen
-from .refit import LATER, Fitted, collected, refit, without
+from .candidates import Candidate, FittedCandidate, screen
+from .earlier_effects import certain, in_best_laws, needed
 from .selection_result import Rejection, Selection, Step
 from .training_data import TrainingData
 
@@ -95,86 +93,6 @@ def select(
     found = next((step.best for step in reversed(steps) if step.accepted), None)
     now, reached, data = (found.fit.model, found.score, found.training_data) if found else (model, score, training_data)
     return Selection(model, now, reached, tuple(steps), data.null, in_time, data)
-
-
-def certain(steps: Sequence[Step]) -> list[Step]:
-    """The steps without the effects whose intervals, beside all others, do not exclude that they are absent.
-
-    Only the last model shows this: while an effect is missing, the misfit makes the intervals of others wide.
-    """
-    kept = list(steps)
-    while accepted := [step for step in kept if step.accepted]:
-        doubtful = (step for step in reversed(accepted) if not is_certain(_beside_newest(step, accepted)))
-        if (step := next(doubtful, None)) is None:
-            break
-        rejected = Rejection(step.best.name, "its interval does not exclude that it is absent")
-        if step is accepted[-1]:
-            kept = [*accepted[:-1], replace(step, accepted=False, rivals=(), rejected=(rejected, *step.rejected))]
-            continue
-        fewer = _taken_back(step, accepted, without(_beside_newest(step, accepted)), rejected)
-        if fewer is None:
-            break
-        kept = [*fewer, *kept[len(accepted) :]]
-    return kept
-
-
-def needed(accepted: Sequence[Step]) -> list[Step]:
-    """The steps without those whose effects the newest one makes superfluous."""
-    steps = list(accepted)
-    for step in accepted[:-1]:
-        newest, earlier = steps[-1].best, _beside_newest(step, steps)
-        if is_certain(earlier):
-            continue
-        alone = without(earlier)
-        if alone is None or alone.score.cost - newest.score.cost >= LEAST_GAIN:
-            continue
-        reason = f"beside {newest.name}, its interval does not exclude that it is absent"
-        steps = _taken_back(step, steps, alone, Rejection(earlier.name, reason)) or steps
-    return steps
-
-
-def in_best_laws(accepted: Sequence[Step], effects: Collection[type[Effect]]) -> list[Step]:
-    """The steps with every earlier effect in the law that is best beside the newest one, as long as an error remains.
-
-    The law was chosen when the newest effect was missing, and may have imitated a part of it.
-    """
-    steps = list(accepted)
-    for place, step in enumerate(accepted[:-1]):
-        newest, now = steps[-1].best, _beside_newest(step, steps)
-        laws = [e for e in effects if e.public_name() == now.effect.public_name() and e.name != now.name]
-        if not laws or not leaves_room(newest.score):
-            continue
-        rest = newest.fit.model.without(now.name)
-        first = collected(partial(refit, rest, max_iterations=LATER), screen(rest, newest.training_data, laws))
-        best = simplest(_best_of_each([now, *collected(partial(settled, before=step.before), first)]))
-        alone = refit(step.best.fit.model.without(now.name), best, LATER) if best is not now else None
-        if alone is not None:
-            steps[place] = replace(step, best=alone)
-            steps[place + 1] = replace(steps[place + 1], before=alone.score)
-            steps[-1] = replace(steps[-1], best=replace(best, effect=best.fit.model[newest.name]))
-    return steps
-
-
-def _beside_newest(step: Step, accepted: Sequence[Step]) -> FittedCandidate:
-    """The effect of a step in the newest model, which contains all effects."""
-    newest = accepted[-1].best
-    return replace(newest, effect=newest.fit.model[step.best.name])
-
-
-def _taken_back(step: Step, accepted: Sequence[Step], alone: Fitted | None, rejected: Rejection) -> list[Step] | None:
-    """The accepted steps without an earlier one, from the newest model without its effect; None without a fit."""
-    newest = accepted[-1].best
-    if alone is None:
-        return None
-    best = refit(alone.model.without(newest.name), replace(newest, effect=alone.model[newest.name]), LATER)
-    if best is None:
-        return None
-    steps = list(accepted)
-    place = steps.index(step)
-    steps[place + 1] = replace(steps[place + 1], before=step.before)
-    del steps[place]
-    steps[-1] = replace(steps[-1], best=best, rejected=(*steps[-1].rejected, rejected))
-    return steps
 
 
 def _turn(
@@ -230,16 +148,16 @@ def _best_effect(
     """Refits of the best candidates, the best of them, and the rejection of its effect or None."""
     best: FittedCandidate | None = None
     rejection: Rejection | None = None
-    refits = _best_of_each(refit_candidates(model, _worth_a_refit(screened, before), before, progress))
+    refits = best_of_each(refit_candidates(model, _worth_a_refit(screened, before), before, progress))
     if refits:
-        refits = _best_of_each([*refits, *refits_of_twins(screened, refits[0], before)])
+        refits = best_of_each([*refits, *refits_of_twins(screened, refits[0], before)])
         best, rejection = _judged(refits, before)
     tried = screened
     if best is not None and rejection is None:  # a fit that leaves an error may have ended in another minimum
         same = best.effect.public_name() if best.score.excess > ADEQUATE else None
         tried = [c for c in screened if c.effect.public_name() == same]
     if late := refits_behind_new_dynamics(model, tried, before):
-        refits = _best_of_each([*refits, *late])
+        refits = best_of_each([*refits, *late])
         best, rejection = _judged(refits, before)
     return refits, best, rejection
 
@@ -248,12 +166,6 @@ def _worth_a_refit(screened: Sequence[Candidate], before: Score) -> Sequence[Can
     """The best candidates; at the floor, what remains is small, and only those whose predicted gain is sufficient."""
     best = screened[:REFITS]
     return best if before.excess > ADEQUATE else [c for c in best if before.cost - c.score.cost >= LEAST_GAIN]
-
-
-def _best_of_each(refits: list[FittedCandidate]) -> list[FittedCandidate]:
-    """The best refit of every effect, best first; a limit that bends all along the drive is a curve and not a limit."""
-    worst_first = sorted((c for c in refits if not bends_all_along(c)), key=BY_COST, reverse=True)
-    return sorted({c.name: c for c in worst_first}.values(), key=BY_COST)
 
 
 def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> Rejection | None:

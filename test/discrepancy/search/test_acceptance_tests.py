@@ -21,12 +21,11 @@ import pytest
 
 from piezo_hysteresis.discrepancy.search import acceptance_tests
 from piezo_hysteresis.discrepancy.search.acceptance_tests import (
-    bends_all_along,
     first_rejection,
     gains_in_most,
     is_steady,
 )
-from piezo_hysteresis.discrepancy.search.candidate_refits import simplest
+from piezo_hysteresis.discrepancy.search.candidate_refits import bends_all_along, simplest
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.refit import Fitted
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData

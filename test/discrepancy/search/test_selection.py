@@ -24,8 +24,9 @@ from hypothesis import strategies as st
 
 from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, leaves_room
 from piezo_hysteresis.discrepancy.search.candidates import Candidate, score_model
+from piezo_hysteresis.discrepancy.search.earlier_effects import certain, in_best_laws, needed
 from piezo_hysteresis.discrepancy.search.refit import LATER, refit
-from piezo_hysteresis.discrepancy.search.selection import certain, in_best_laws, needed, select
+from piezo_hysteresis.discrepancy.search.selection import select
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step, explained
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import CATALOGUE, HYSTERESIS, Arx, Creep, CreepExponential, Offset, ThermalDrift

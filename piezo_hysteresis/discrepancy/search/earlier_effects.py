@@ -1,0 +1,111 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Earlier effects judged again beside the newest one: superfluous ones, laws that are no longer best, uncertain ones.
+
+An effect is chosen while others are missing. It can imitate a part of them, and its law may be one that does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from functools import partial
+
+from ...effects import Effect
+from .acceptance_tests import is_certain
+from .candidate_refits import LEAST_GAIN, best_of_each, leaves_room, settled, simplest
+from .candidates import FittedCandidate, screen
+from .refit import LATER, Fitted, collected, refit, without
+from .selection_result import Rejection, Step
+
+
+def certain(steps: Sequence[Step]) -> list[Step]:
+    """The steps without the effects whose intervals, beside all others, do not exclude that they are absent.
+
+    Only the last model shows this: while an effect is missing, the misfit makes the intervals of others wide.
+    """
+    kept = list(steps)
+    while accepted := [step for step in kept if step.accepted]:
+        doubtful = (step for step in reversed(accepted) if not is_certain(_beside_newest(step, accepted)))
+        if (step := next(doubtful, None)) is None:
+            break
+        rejected = Rejection(step.best.name, "its interval does not exclude that it is absent")
+        if step is accepted[-1]:
+            kept = [*accepted[:-1], replace(step, accepted=False, rivals=(), rejected=(rejected, *step.rejected))]
+            continue
+        fewer = _taken_back(step, accepted, without(_beside_newest(step, accepted)), rejected)
+        if fewer is None:
+            break
+        kept = [*fewer, *kept[len(accepted) :]]
+    return kept
+
+
+def needed(accepted: Sequence[Step]) -> list[Step]:
+    """The steps without those whose effects the newest one makes superfluous."""
+    steps = list(accepted)
+    for step in accepted[:-1]:
+        newest, earlier = steps[-1].best, _beside_newest(step, steps)
+        if is_certain(earlier):
+            continue
+        alone = without(earlier)
+        if alone is None or alone.score.cost - newest.score.cost >= LEAST_GAIN:
+            continue
+        reason = f"beside {newest.name}, its interval does not exclude that it is absent"
+        steps = _taken_back(step, steps, alone, Rejection(earlier.name, reason)) or steps
+    return steps
+
+
+def in_best_laws(accepted: Sequence[Step], effects: Collection[type[Effect]]) -> list[Step]:
+    """The steps with every earlier effect in the law that is best beside the newest one, as long as an error remains.
+
+    The law was chosen when the newest effect was missing, and may have imitated a part of it.
+    """
+    steps = list(accepted)
+    for place, step in enumerate(accepted[:-1]):
+        newest, now = steps[-1].best, _beside_newest(step, steps)
+        laws = [e for e in effects if e.public_name() == now.effect.public_name() and e.name != now.name]
+        if not laws or not leaves_room(newest.score):
+            continue
+        rest = newest.fit.model.without(now.name)
+        first = collected(partial(refit, rest, max_iterations=LATER), screen(rest, newest.training_data, laws))
+        best = simplest(best_of_each([now, *collected(partial(settled, before=step.before), first)]))
+        alone = refit(step.best.fit.model.without(now.name), best, LATER) if best is not now else None
+        if alone is not None:
+            steps[place] = replace(step, best=alone)
+            steps[place + 1] = replace(steps[place + 1], before=alone.score)
+            steps[-1] = replace(steps[-1], best=replace(best, effect=best.fit.model[newest.name]))
+    return steps
+
+
+def _beside_newest(step: Step, accepted: Sequence[Step]) -> FittedCandidate:
+    """The effect of a step in the newest model, which contains all effects."""
+    newest = accepted[-1].best
+    return replace(newest, effect=newest.fit.model[step.best.name])
+
+
+def _taken_back(step: Step, accepted: Sequence[Step], alone: Fitted | None, rejected: Rejection) -> list[Step] | None:
+    """The accepted steps without an earlier one, from the newest model without its effect; None without a fit."""
+    newest = accepted[-1].best
+    if alone is None:
+        return None
+    best = refit(alone.model.without(newest.name), replace(newest, effect=alone.model[newest.name]), LATER)
+    if best is None:
+        return None
+    steps = list(accepted)
+    place = steps.index(step)
+    steps[place + 1] = replace(steps[place + 1], before=step.before)
+    del steps[place]
+    steps[-1] = replace(steps[-1], best=best, rejected=(*steps[-1].rejected, rejected))
+    return steps
