@@ -146,6 +146,8 @@ def test_a_displacement_is_set_and_a_slow_integral_removes_the_remaining_error(l
     lab.wait(settled, "the displacement that was set")
     publisher.publish(Float64(data=5.0 * STROKE))
     assert "not reachable" in node.until("set_displacement", "refused").message
+    assert node.ask("stop").success
+    assert "goes to its safe voltage" in node.until("set_displacement", "stopped").message
 
 
 @pytest.mark.parametrize("end", ["stop", "cancel", "kill"])

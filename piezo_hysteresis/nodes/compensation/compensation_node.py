@@ -243,13 +243,15 @@ class CompensationNode(GuardedNode):
         return response
 
     def _on_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        held = "set_displacement" if self._set_point.is_holding else ""
+        ended, asked = held if self._job is None else self._phase, self._driver.stop()
         self._set_point.leave()
-        asked = self._driver.stop()
         if self._job is not None:
             self._give_up()
-        self._status.show("stopped", "on request; the driver goes to its safe voltage", self._phase)
+        effect = "the driver goes to its safe voltage" if asked else "there is no driver to stop"
+        self._status.show("stopped", f"on request; {effect}", ended)
         response.success = asked is not None
-        response.message = "stopped; the driver goes to its safe voltage" if asked else "there is no driver to stop"
+        response.message = f"stopped; {effect}" if asked else effect
         return response
 
 
