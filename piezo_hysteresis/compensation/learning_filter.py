@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -165,8 +166,8 @@ class LearningFilter:
         weight = gain * known
         correction = np.fft.irfft(weight * spectrum, size)[:n]
         signal = power - floor  # negative terms are kept, so that the sum over pure noise is zero on average
-        in_band = gain > 0.0
-        left = max(0.0, np.sum(((1.0 - weight) ** 2 * signal + weight**2 * np.minimum(floor, power))[in_band]))
-        now = max(0.0, np.sum(signal[in_band]))
-        scale = 2.0 / size**2
-        return correction, float(np.sqrt(scale * left)), float(np.sqrt(scale * now))
+        lines = np.where(gain > 0.0, 2.0, 0.0) / size**2
+        lines[[0, -1]] *= 0.5  # those at dc and at the Nyquist frequency have no partner of negative frequency
+        left = max(0.0, float(lines @ ((1.0 - weight) ** 2 * signal + weight**2 * np.minimum(floor, power))))
+        now = max(0.0, float(lines @ signal))
+        return correction, math.sqrt(left), math.sqrt(now)

@@ -85,6 +85,24 @@ def test_every_round_is_predicted_to_be_better_before_it_is_played() -> None:
         assert after.expected < before.rms
 
 
+def test_a_constant_error_is_predicted_by_its_own_size() -> None:
+    """Its spectral line at 0 Hz has no partner of negative frequency; it counted twice."""
+    _, left, now = LearningFilter(PERIOD, gain=0.9).correct(np.full(1000, 1e-7), 0.0)
+    assert now == pytest.approx(1e-7, rel=1e-9)
+    assert left == pytest.approx(1e-8, rel=1e-9)
+
+
+def test_what_a_round_is_predicted_to_leave_contains_the_noise() -> None:
+    """A path that lies 0.1 % of its range beside the wanted one, and noise of 0.05 %: 0.014 % were predicted."""
+    model, noise = stage(), 5e-4 * np.ptp(WANTED)
+    got = IterativeLearning(model, plan(model, WANTED, LIMITS), LIMITS, noise=noise)
+    first = got.next
+    assert first is not None
+    beside = first.predicted + 1e-3 * np.ptp(WANTED)
+    assert got.update(beside + noise * np.random.default_rng(1).normal(size=beside.size)) is not None
+    assert got.expected == pytest.approx(np.hypot(noise, 1e-4 * np.ptp(WANTED)), rel=0.1)
+
+
 def test_a_round_that_got_worse_is_the_last() -> None:
     got = learning()
     worse = np.random.default_rng(1)
