@@ -64,7 +64,14 @@ DRIVER: tuple[Row, ...] = (
         _SOURCE,
     ),
     Parameter(
-        "max_slew_rate", "S_max", "V/s", 0.0, 0.0, 1e12, "steepest drive; 0: 0.4 of the range per sample", _SOURCE
+        "max_slew_rate",
+        "S_max",
+        "V/s",
+        0.0,
+        0.0,
+        1e12,
+        "steepest drive; 0: 0.4 of the range per sample, or ramp_rate if that is steeper",
+        _SOURCE,
     ),
     Parameter(
         "ramp_rate", "S_r", "V/s", 50.0, 1e-3, 1e9, "rate of ramps to set-points and to the safe voltage", _SOURCE
