@@ -22,7 +22,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..effects import UnnamedCorrection
+from ..effects import Arx, UnnamedCorrection
+from ..effects.effect import Discretisation
 from ..model.model import Model
 from ..parameter import slew_text
 from ..record import Experiment, Notice, Record
@@ -51,6 +52,8 @@ The influence of a lag or a mode grows with the frequency, that of creep with it
 """
 ABOVE = 4.0
 """Standard deviations of the noise of a measured voltage that count for no motion between two samples."""
+COARSE = 0.02
+"""RMS error from the dynamics at slow samples, as a share of the range of the drive, from which it is reported."""
 STEEP = 0.99
 """Share of the moving samples whose rate is at most the rate of a record."""
 
@@ -123,6 +126,12 @@ def _outside_of(model: Model, record: Record, before: float) -> Iterator[Notice]
     if drive_moves and SLOWER * motion.slowest < slowest and motion.bandwidth > 0.0:
         said = f"the drive is as slow as {motion.slowest:.3g} Hz, the model was identified from {slowest:.3g} Hz"
         yield Notice("outside_frequencies", said, record.phase)
+    if drive_moves and (error := _error_of_slow_samples(model, record)) > COARSE:
+        said = (
+            f"at {record.sample_period:g} s per sample the dynamics of the model are a gain and a lag, which for this"
+        )
+        said += f" drive can be wrong by {100.0 * error:.2g} % of its range; record it at {model.sample_period:g} s"
+        yield Notice("outside_frequencies", said, record.phase)
     rate, step = _slew_rate(record), _largest_step(record, before)
     sudden, steepest_step = step / record.sample_period, float(model.provenance.get(STEEPEST_STEP, np.inf))
     is_known_step = motion.is_step and sudden <= FASTER * steepest_step < np.inf
@@ -151,6 +160,20 @@ def _motion(record: Record) -> ExcitationContent:
         return content
     slowest, _ = rates_of_waves(voltage, record.sample_period, float(voltage_noise((record,))[0]))
     return replace(content, slowest=slowest)
+
+
+def _error_of_slow_samples(model: Model, record: Record) -> float:
+    """RMS error of dc gain and group delay in the place of G, as a share of the range; 0 at the model's period."""
+    dynamics = next((e for e in model.effects if isinstance(e, Arx)), None)
+    if dynamics is None or not Discretisation(record.sample_period, model.sample_period).is_slow:
+        return 0.0
+    frequency = np.asarray(np.fft.rfftfreq(record.size, record.sample_period), np.float64)
+    power = np.abs(np.fft.rfft((record.voltage - record.voltage.mean()) * np.hanning(record.size + 2)[1:-1])) ** 2
+    lag = max(dynamics.group_delay, 0.0) * model.sample_period
+    response = dynamics.response(frequency, model.sample_period) / dynamics.dc_gain
+    wrong = np.abs(response - np.exp(-2j * np.pi * frequency * lag)) ** 2
+    share = np.std(record.voltage) / np.ptp(record.voltage)
+    return float(share * np.sqrt(power @ wrong / power.sum()))
 
 
 def _lag_error(model: Model, frequency: float) -> str:

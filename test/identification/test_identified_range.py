@@ -49,6 +49,21 @@ def test_only_a_drive_outside_the_range_is_reported():
     assert slow.message == "the drive is as slow as 0.25 Hz, the model was identified from 1 Hz"
 
 
+def test_a_drive_is_reported_whose_slow_samples_do_not_show_the_dynamics():
+    """A model with a pole of 5 ms was wrong by 17 % of the range at slow samples, and the stage got the blame."""
+    period, pole = 2e-4, np.exp(-2e-4 / 5e-3)
+    dynamics = Arx(a=(-pole,), b=(1.0 - 0.5 * pole, -0.5 * pole), delay=1.0)
+    slow, fast = sine(3.0, 1.0), sine(3.0, 50.0)
+    model = Model((BoucWen(), dynamics), period, provenance=identified_range((slow, fast), (0, 1)))
+    (said,) = outside(model, Experiment((slow, fast)))
+    fine = np.interp(period * np.arange(5 * TIME.size - 4), TIME, fast.voltage)
+    exact = model.simulate(fine)[::5]
+    coarse = model.simulate(fast.voltage, sample_period=1e-3)
+    error = np.std((coarse - exact)[1000:]) / np.ptp(coarse[1000:])
+    assert said.phase == fast.phase
+    assert float(re.search("wrong by ([0-9.]+) %", said.message)[1]) == pytest.approx(100.0 * error, rel=0.2)
+
+
 def test_a_step_does_not_hide_the_rates_of_the_sines_after_it():
     """It has most of the power of dv/dt; a model of 1 Hz was called known up to 870 Hz, and from 9 Hz on."""
     period = 5e-4
