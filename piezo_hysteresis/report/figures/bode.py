@@ -41,6 +41,12 @@ GAP = 8
 """Number of consecutive incoherent lines after which the drive has no power."""
 EDGE = 20
 """Number of lines with which the last one is compared; it is left out if it is three times as uncertain."""
+MODEL_LINES = (
+    "Dashed: the model, estimated in the same way. Dotted: G alone, times the slope of the loop at a turning point. "
+    "At low frequency the measured response differs from this line, because noise of larger amplitude shows more "
+    "hysteresis. "
+)
+"""Words about the lines of a model."""
 
 
 @styled
@@ -98,10 +104,9 @@ def bode(comparison: ModelComparison) -> Drawing | None:
         "Frequency response",
         (
             "Frequency response from drive to displacement, including hysteresis, averaged over "
-            "segments. The bars are ± 2σ. Dashed: the model, estimated in the same way. Dotted: G "
-            "alone, times the slope of the loop at a turning point. At low frequency the measured "
-            "response differs from this line, because noise of larger amplitude shows more hysteresis. "
-            "If two amplitudes of noise disagree, the stage has hysteresis, backlash or a gain that "
+            "segments. The bars are ± 2σ. "
+            + ("" if comparison.now is None else MODEL_LINES)
+            + "If two amplitudes of noise disagree, the stage has hysteresis, backlash or a gain that "
             "depends on amplitude."
         ),
         "Bode diagram. " + "; ".join(descriptions) + ".",

@@ -36,6 +36,8 @@ CLOSED = 0.25
 """Largest distance between the ends of a loop, as a share of its height."""
 PANELS = 6
 """Largest number of loops in one figure."""
+BELOW = " Below: measured minus predicted over the same drive."
+"""Words about the residual of a model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,9 +122,10 @@ def loops_by_amplitude(comparison: ModelComparison) -> Drawing | None:
         "loops_by_amplitude",
         "Loops by amplitude",
         (
-            "Slow loops, one panel per amplitude of the drive. The dashed line (model) should cover "
-            "the solid line (measured). The opening is the width of the loop at half its height, in "
-            "% of the height. Below: measured minus predicted over the same drive."
+            "Slow loops, one panel per amplitude of the drive. The opening is the width of the loop at half its "
+            "height, in % of the height."
+            + ("" if comparison.now is None else " The dashed line (model) should cover the solid line (measured).")
+            + ("" if comparison.now is None else BELOW)
         ),
     )
 
@@ -148,8 +151,8 @@ def loops_by_frequency(comparison: ModelComparison) -> Drawing | None:
         "Loops by frequency",
         (
             "The last full cycle of every sine. The slowest loop shows the hysteresis. With frequency, "
-            "the lag of amplifier, mechanics and sensor opens the loops further. Below: measured minus "
-            "predicted over the same drive."
+            "the lag of amplifier, mechanics and sensor opens the loops further."
+            + ("" if comparison.now is None else BELOW)
         ),
     )
 

@@ -152,7 +152,9 @@ def time_series(comparison: ModelComparison) -> Drawing:
         "time_series",
         "Against time",
         (
-            "Displacement, and below it the residual (measured minus predicted). Fast phases are shown "
+            "Displacement. Of repeated phases, one is shown; of the sines, the slowest and the fastest."
+            if now is None
+            else "Displacement, and below it the residual (measured minus predicted). Fast phases are shown "
             "around their largest residual. A phase that begins in an unknown state is not shown. Of "
             "repeated phases, the one with the largest error is shown; of the sines, the slowest and the fastest."
             + ("" if comparison.bands is None else BAND)

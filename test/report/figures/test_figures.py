@@ -65,6 +65,7 @@ def test_without_a_model_a_figure_shows_the_data_or_nothing(figure, bare):
     drawing = figure(bare)
     if drawing is not None:
         assert not any("predicted" in column or "residual" in column for column in drawing.data)
+        assert not any(word in drawing.caption for word in ("predicted", "residual", "model"))
 
 
 @pytest.mark.parametrize("figure", FIGURES, ids=lambda f: f.__name__)
