@@ -43,18 +43,23 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
     """First reason to reject a fitted candidate; None if it passes all tests. The cheap tests come first."""
     gain = before.cost - best.score.cost
     if gain < LEAST_GAIN:
-        lowers = f"lowers mean ln R² by {gain:.2f}" if gain >= SHOWN else "does not lower mean ln R²"
+        lowers = f"lowers mean ln R² by {_below(gain)}" if gain >= SHOWN else "does not lower mean ln R²"
         return Rejection(best.name, f"in cross-validation it {lowers}, and a decrease by {LEAST_GAIN:g} is needed")
     if best.name == MainsHum.name and not (is_steady(best) and gains_in_most(best, before)):
         return Rejection(best.name, "its amplitude depends on the drive, which mains hum does not")
     alone = without(best)
     owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
     if owed < LEAST_GAIN:
-        gains = f"gains only {owed:.2g} of the {LEAST_GAIN:g} that are needed" if owed >= SHOWN else "gains nothing"
+        gains = f"gains only {_below(owed)} of the {LEAST_GAIN:g} that are needed" if owed >= SHOWN else "gains nothing"
         return Rejection(best.name, f"it {gains} over the model that was refitted without it")
     if before.excess <= ADEQUATE and not is_certain(best):
         return Rejection(best.name, "the error is at the floor, and its interval does not exclude that it is absent")
     return None
+
+
+def _below(gain: float) -> str:
+    """A gain below `LEAST_GAIN`, in two digits or in as many as show that it is below."""
+    return next(text for text in (f"{gain:.{digits}f}" for digits in range(2, 20)) if float(text) < LEAST_GAIN)
 
 
 def is_certain(candidate: FittedCandidate) -> bool:
