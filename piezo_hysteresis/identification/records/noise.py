@@ -38,8 +38,11 @@ SMALLEST, LARGEST = 1e-6, 5e-3
 """Noise of a measured voltage, as a share of its range: less is not noticed, and more is a drive that is random."""
 WINDOWS = (5, 7, 9, 11, 13, 17, 25, 33, 49, 65, 97, 129, 193, 257)
 """Numbers of samples over which a noisy voltage may be smoothed."""
-WIDTH = 0.5
-"""Half width of the plays that take away its turns, in standard deviations of the noise."""
+WIDTH, NARROW = 0.5, 0.35
+"""Half width of the plays that take away its turns, in standard deviations of the noise: of a smooth voltage, and of a
+fast one, which has more turns of its own."""
+OFTEN = 0.5
+"""Share of samples at which a fast drive turns, above which a play would take its own turns; white noise has 2/3."""
 AGREE = 2.5
 """Standard deviations within which the smooth voltages of two windows agree."""
 VOLTAGE_NOISE = "voltage_noise"
@@ -127,21 +130,30 @@ def quieted(record: Record, noise: float) -> Record:
 
     A hysteresis loop responds to every small turn of the voltage and loses memory, and a mode rings with it. The stage
     has not seen the measured noise, so the model must not see it. What is left of the noise would still turn the
-    drive. A play takes these turns away: the mean of one that runs forward and one that runs backward does not lag.
+    drive. A play takes these turns away, also where the drive is too fast to be smoothed.
     """
     if noise == 0.0:
         return record
     measured = np.array(record.voltage)
     smooth, share = _smooth(measured, noise)
-    forward, backward = np.empty(smooth.size), np.empty(smooth.size)
-    for drive, followed in ((smooth, forward), (smooth[::-1].copy(), backward)):
-        play_positions(drive, WIDTH * noise, drive[0], followed)
-    quiet = 0.5 * (forward + backward[::-1])
-    # Stein's unbiased estimate of the squared error: a fast random drive is not smooth, and is left as it was measured
+    quiet = _without_turns(smooth, WIDTH * noise)
+    # Stein's unbiased estimate of the squared error: a fast random drive is not smooth, and keeps its peaks
     error = (quiet - measured) ** 2 + (2.0 * share - 1.0) * noise**2
     near = np.minimum(scipy.ndimage.uniform_filter1d(error, WINDOWS[-1], mode="mirror"), noise**2)
-    voltage = np.where(near < noise**2, quiet, measured)
+    is_fast = near >= noise**2
+    turns = np.diff(measured[1:]) * np.diff(measured[:-1]) < 0.0
+    is_white = np.sum(turns & is_fast[1:-1]) > OFTEN * np.sum(is_fast)
+    fast = measured if is_white else _without_turns(measured, NARROW * noise)
+    voltage = np.where(is_fast, fast, quiet)
     return replace(record, voltage=voltage, voltage_noise=math.sqrt(max(0.0, float(near.mean()))))
+
+
+def _without_turns(drive: Samples, width: float) -> Samples:
+    """The mean of a play of half width `width` [V] that runs forward and of one that runs backward: it does not lag."""
+    forward, backward = np.empty(drive.size), np.empty(drive.size)
+    for way, followed in ((drive, forward), (drive[::-1].copy(), backward)):
+        play_positions(way, width, way[0], followed)
+    return np.asarray(0.5 * (forward + backward[::-1]))
 
 
 def _smooth(values: Samples, noise: float) -> tuple[Samples, Samples]:
