@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import chdtri
 
-from ...effects import MainsHum
+from ...effects import AmplifierSaturation, Backlash, MainsHum
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.form_uncertainty import with_form_uncertainty
 from ...identification.records.noise_floor import ADEQUATE, stroke
@@ -37,6 +37,8 @@ STEADY = 0.3
 """Smallest ratio of the quartiles of the amplitude of hum, and of the median to the mean of its gain."""
 UNCERTAIN = 0.05
 """Probability of a size at least as large without the effect, up to which the effect is certain."""
+PEAKS = 3.0
+"""Standard deviations that noise hardly exceeds."""
 
 
 def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
@@ -47,6 +49,8 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
         return Rejection(best.name, f"in cross-validation it {lowers}, and a decrease by {LEAST_GAIN:g} is needed")
     if best.name == MainsHum.name and not (is_steady(best) and gains_in_most(best, before)):
         return Rejection(best.name, "its amplitude depends on the drive, which mains hum does not")
+    if not exceeds_voltage_noise(best):
+        return Rejection(best.name, "it changes the voltage no more than the noise with which it was measured")
     alone = without(best)
     owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
     if owed < LEAST_GAIN:
@@ -115,3 +119,19 @@ def _resolve(hum: FittedCandidate) -> list[bool]:
         bool(np.isfinite(floor)) and r.duration * frequency >= PERIODS and r.sample_period * frequency <= RESOLVED
         for r, floor in zip(data.records, data.floors, strict=True)
     ]
+
+
+def exceeds_voltage_noise(candidate: FittedCandidate) -> bool:
+    """Whether a backlash or a limit changes the voltage by more than the noise with which it was measured.
+
+    The stage has not seen what is left of this noise. A narrow play, or a limit at the lowest voltage, keeps it from
+    the model.
+    """
+    effect, records = candidate.effect, candidate.training_data.records
+    noise = max((record.voltage_noise for record in records), default=0.0)
+    if noise == 0.0 or effect.name not in (Backlash.name, AmplifierSaturation.name):
+        return True
+    if effect.name == Backlash.name:
+        return bool(effect["b"] > PEAKS * noise)
+    cut = (np.clip(r.voltage, effect["lower"], effect["upper"]) - r.voltage for r in records)
+    return bool(max(float(np.sqrt(np.mean(c**2))) for c in cut) > PEAKS * noise)

@@ -29,7 +29,15 @@ from piezo_hysteresis.discrepancy.search.candidate_refits import bends_all_along
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.refit import Fitted
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
-from piezo_hysteresis.effects import AmplifierSaturation, BoucWen, Creep, CreepFractional, GainDrift, MainsHum
+from piezo_hysteresis.effects import (
+    AmplifierSaturation,
+    Backlash,
+    BoucWen,
+    Creep,
+    CreepFractional,
+    GainDrift,
+    MainsHum,
+)
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
@@ -121,6 +129,28 @@ def test_hum_lowers_the_error_of_most_records_whatever_the_drive_does(left, main
     data = TrainingData((Record(np.zeros(1000), np.zeros(1000), 1e-3),) * 5, np.ones(5), EXTENT)
     hum = replace(hum, training_data=data, score=scored(*left))
     assert gains_in_most(hum, scored(3.1, 3.2, 3.3, 3.1, 3.0)) is mains
+
+
+@pytest.mark.parametrize("noise", [0.0, 4e-3])
+@pytest.mark.parametrize(
+    ("effect", "small"),
+    [
+        (Backlash(b=2e-3), True),
+        (Backlash(b=5e-2), False),
+        (AmplifierSaturation(lower=3e-3), True),
+        (AmplifierSaturation(upper=7.0), False),
+    ],
+    ids=["narrow", "wide", "at 0 V", "at 7 V"],
+)
+def test_what_only_keeps_the_noise_of_a_measured_voltage_from_the_model_is_no_effect(monkeypatch, noise, effect, small):
+    """Beside creep, a backlash of 1.9 mV was named, and a limit at 2.3 mV of a stage without effects."""
+    monkeypatch.setattr(acceptance_tests, "without", lambda candidate: None)
+    drive = np.maximum(0.0, 8.0 * np.sin(np.linspace(0.0, 20.0, 2000)))
+    record = Record(drive + noise * np.random.default_rng(0).normal(size=2000), drive, 1e-3, voltage_noise=noise)
+    found = fitted(effect, (), np.empty((0, 0)))
+    found = replace(found, training_data=replace(found.training_data, records=(record,)), score=scored(1.0, 1.0))
+    rejection = first_rejection(found, scored(9.0, 9.0))
+    assert (rejection is not None and "noise" in rejection.reason) if small and noise else rejection is None
 
 
 @pytest.mark.parametrize(("corner", "curve"), [(0.1, False), (4.0, False), (30.0, True)])
