@@ -72,33 +72,16 @@ class Bench:
         self.lab.wait(plays, f"{name} to be played")
         return statuses
 
-    def rests(self):
-        """Stop, as often as it takes, and wait for the safe voltage."""
-        client = self.lab.node.create_client(Trigger, "driver_node/cancel")
-
-        def stopped():
-            client.call_async(Trigger.Request())
-            self.lab.pause(0.5)
-            return self.samples.newest.voltage[-1] < 1e-3
-
-        self.lab.wait(stopped, "the safe voltage")
-
-
-@pytest.fixture(scope="module")
-def shared_bench(shared_lab):
-    """One driver for all tests here, and those that take its place."""
-    return Bench(shared_lab)
-
 
 @pytest.fixture
-def bench(shared_bench):
-    """The driver at rest at its safe voltage; the log of the stage is looked at when the test is over."""
-    lab = shared_bench.lab
-    lab.forget()
-    shared_bench.samples = lab.streaming()
-    shared_bench.rests()
-    yield shared_bench
-    shared_bench.log.check()
+def bench(lab):
+    """A driver and a node of the test's own; the log of the stage is looked at when the test is over.
+
+    What a killed driver leaves in the node that spoke to it must not reach the next test, nor a second try.
+    """
+    bench = Bench(lab)
+    yield bench
+    bench.log.check()
 
 
 @pytest.mark.parametrize("when", ["idle", "waveform", "hold", "way_to_safety"])
