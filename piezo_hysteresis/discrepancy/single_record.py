@@ -77,22 +77,21 @@ class _Start:
     """The models before the search: the published or the given one, fitted jointly in `setup`, and the one to extend.
 
     `model` has the structure that predicts best (`found`), unless a model was given or the time was over before.
+    `short` are the records of the search, with their floors [m].
     """
 
     setup: BaselineSetup
     model: Model
     found: Identification | None
     in_time: bool
+    short: tuple[Record, ...]
+    short_floors: Array
+    has_several_drives: bool
 
     @property
     def leaves_gap(self) -> bool:
         """Whether the error of the published model is above its floor."""
         return self.setup.score.excess > ADEQUATE
-
-    @property
-    def has_several_drives(self) -> bool:
-        """Whether the fitted records have several rates or amplitudes."""
-        return has_several_drives(self.setup.records, self.setup.fitted)
 
 
 def diagnose_few(state: DiagnosisState) -> Diagnosis:
@@ -150,23 +149,18 @@ def _start(state: DiagnosisState) -> _Start:
         except TimeSpentError:
             in_time = False
     model, noise = found.model if found else published, noise_floors(records)
-    short, quiet, least = _shortened(records, noise)
+    short = shortened(records, SEARCHED)
+    quiet = noise_of_averages(noise, records, short)
+    least = floors(short, quiet)
     data = training_data_of(short, fitted, quiet, least, model)
     baseline = joint(with_zero(published), data, LAST, SHARP)
     score, lost = score_model(baseline.model, data, baseline.linearised), [np.zeros(r.size) for r in records]
     whole, span = floors(records, noise), experiment.range
     setup = BaselineSetup(records, records, lost, noise, whole, span, used, fitted, aside, data, baseline, score)
-    start = _Start(setup, model, found, in_time)
+    start = _Start(setup, model, found, in_time, short, least, has_several_drives(records, fitted))
     if start.leaves_gap:
         start_helpers()  # effects will be searched for
     return start
-
-
-def _shortened(records: Sequence[Record], noise: Array) -> tuple[tuple[Record, ...], Array, Array]:
-    """The records of the search, with their noise and floors [m]."""
-    short = shortened(records, SEARCHED)
-    quiet = noise_of_averages(noise, records, short)
-    return short, quiet, floors(short, quiet)
 
 
 def _extended(state: DiagnosisState, start: _Start) -> tuple[Selection, Fit | None, bool]:
@@ -178,8 +172,8 @@ def _extended(state: DiagnosisState, start: _Start) -> tuple[Selection, Fit | No
     now, score = (found.fit, score_model(start.model, data)) if found else (setup.baseline, setup.score)
     steps: list[Step] = []
     if found and start.leaves_gap and start.has_several_drives:
-        short, _, least = _shortened(setup.records, setup.noise)
-        steps = structure_steps(found, setup.score, data, short, least.tolist(), setup.fitted)
+        short_floors = start.short_floors.tolist()
+        steps = structure_steps(found, setup.score, data, start.short, short_floors, setup.fitted)
     is_certain = bool(steps)
     fitting = [e for e in state.effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
     with ending_at(state.end):

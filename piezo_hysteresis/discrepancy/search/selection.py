@@ -133,12 +133,12 @@ def _turn(
         return Rejection(candidate.name, message)
 
     fitted = [c for c in refits if c.name != best.name]
+    rivals = tuple(filter(is_rival, fitted))
     others = [c for c in screened if all(c.name != r.name for r in refits)]
     rejected = [Rejection(name, f"on slow drive it equals {t}, which is in the model") for name, t in twins.items()]
     rejected += [] if rejection is None else [rejection]
-    rejected += [behind(c) for c in fitted if not is_rival(c)]
+    rejected += [behind(c) for c in fitted if c not in rivals]
     rejected += map(not_refitted, others)
-    rivals = tuple(filter(is_rival, fitted))
     return Step(before, best, rejection is None, rivals, tuple(rejected), (*refits, *others))
 
 
