@@ -96,7 +96,14 @@ def fit(changed, **options):
 
 
 @pytest.mark.parametrize(
-    ("group", "size"), [("gain", 0.004), ("gain", -0.05), ("loop", 0.03), ("dynamics", 2e-5), ("dynamics", 1.5e-3)]
+    ("group", "size"),
+    [
+        ("gain", 0.004),
+        pytest.param("gain", -0.05, marks=pytest.mark.soak),
+        pytest.param("loop", 0.03, marks=pytest.mark.soak),
+        pytest.param("dynamics", 2e-5, marks=pytest.mark.soak),
+        ("dynamics", 1.5e-3),
+    ],
 )
 def test_a_change_is_fitted_within_its_interval_and_the_residual_recovers(group, size):
     true = np.zeros(5)

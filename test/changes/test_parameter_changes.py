@@ -68,7 +68,9 @@ def test_another_day_is_not_a_change(model, another_day):
     assert change_of(model, another_day) is None
 
 
-@pytest.mark.parametrize("samples", [0.1, 2.3, 20.0])
+@pytest.mark.parametrize(
+    "samples", [pytest.param(0.1, marks=pytest.mark.soak), 2.3, pytest.param(20.0, marks=pytest.mark.soak)]
+)
 def test_a_delay_is_found_with_its_size(model, another_day, samples):
     change = change_of(model, replace(another_day, filter_delay=samples * PERIOD))
     assert change.kind.family == "lag"
@@ -131,7 +133,9 @@ def test_an_amplifier_that_became_slower_is_found_with_its_size():
     assert amplifier_of(changed_model(before, change, records))["tau"] == pytest.approx(3e-3, rel=0.02)
 
 
-@pytest.mark.parametrize("late", [5e-4, 1e-3, 4e-3])
+@pytest.mark.parametrize(
+    "late", [pytest.param(5e-4, marks=pytest.mark.soak), 1e-3, pytest.param(4e-3, marks=pytest.mark.soak)]
+)
 def test_the_lag_of_a_moving_average_is_said(model, another_day, late):
     change = change_of(model, replace(another_day, filter_mean=late))
     assert change.kind.name == "second_order_low_pass" and change.kind.family == "lag"

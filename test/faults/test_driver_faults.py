@@ -84,7 +84,7 @@ def bench(lab):
     bench.log.check()
 
 
-@pytest.mark.parametrize("when", ["idle", "waveform", "hold", "way_to_safety"])
+@pytest.mark.parametrize("when", [pytest.param("idle", marks=pytest.mark.soak), "waveform", "hold", "way_to_safety"])
 def test_a_driver_killed_in_any_phase_starts_again_at_once(bench, when):
     lab, starts = bench.lab, bench.log.starts
     if when != "idle":

@@ -51,7 +51,7 @@ def recorded(seed, *, averaged, stage=STAGE):
 
 
 @pytest.mark.parametrize("phases", [None, ("step", "triangle", "minor_loops", "validation")], ids=["all", "no noise"])
-@pytest.mark.parametrize("averaged", [True, False])
+@pytest.mark.parametrize("averaged", [True, pytest.param(False, marks=pytest.mark.soak)])
 def test_the_loop_is_as_known_from_averages_as_from_all_samples(averaged, phases):
     """The turns between two averages were taken for a wider loop, in every recording."""
     experiment = recorded(0, averaged=averaged)

@@ -43,7 +43,7 @@ def played(stage, *frequencies):
     [
         pytest.param("drive", (1.0, 60.0), 10.0, marks=pytest.mark.soak),
         pytest.param("mean", (1.0, 60.0), 10.0, marks=pytest.mark.soak),
-        ("pole", (1.0, 10.0), 60.0),
+        pytest.param("pole", (1.0, 10.0), 60.0, marks=pytest.mark.soak),
         ("butterworth", (1.0, 10.0), 60.0),
         pytest.param("drive", (1.0, 10.0), 60.0, marks=pytest.mark.soak),
         pytest.param("mean", (1.0, 10.0), 60.0, marks=pytest.mark.soak),

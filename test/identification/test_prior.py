@@ -116,7 +116,7 @@ def test_larger_amplitudes_are_predicted_although_small_ones_hardly_determine_th
     assert max(row.percent for row in errors(model, large, Nuisance(offset=True)).rows) < 0.5
 
 
-@pytest.mark.parametrize("share", [0.004, -0.004])
+@pytest.mark.parametrize("share", [0.004, pytest.param(-0.004, marks=pytest.mark.soak)])
 def test_a_drift_of_one_record_is_not_mistaken_for_creep(share):
     drive = growing_sine(1.0, PERIOD, (1.0,), cycles=25, hold=0.0)
     record = STAGE.play(drive, PERIOD)

@@ -31,7 +31,7 @@ from piezo_hysteresis.record import Experiment, Record
 PERIOD = 5e-3
 
 
-@pytest.mark.parametrize("mode", [395.0, 590.0], ids=["two", "three"])
+@pytest.mark.parametrize("mode", [pytest.param(395.0, marks=pytest.mark.soak), 590.0], ids=["two", "three"])
 def test_a_mode_above_half_the_sampling_rate_does_not_change_lag_loop_and_creep(mode):
     """Near a multiple of the sampling rate it looks like a slow decay, which lag, loop and creep took up."""
     stage = Nanopositioner(mode=mode, zeta=0.03, pole=1e-4, delay=6e-3)
@@ -54,7 +54,11 @@ def test_a_mode_above_half_the_sampling_rate_is_told_beside_the_one_that_rings_a
 
 @pytest.mark.parametrize(
     ("mode", "zeta", "period"),
-    [(592.0, 0.01, 1e-3), (981.0, 0.024, 1e-3), pytest.param(981.0, 0.024, 5e-4, marks=pytest.mark.soak)],
+    [
+        pytest.param(592.0, 0.01, 1e-3, marks=pytest.mark.soak),
+        (981.0, 0.024, 1e-3),
+        pytest.param(981.0, 0.024, 5e-4, marks=pytest.mark.soak),
+    ],
     ids=["long", "multiple", "half"],
 )
 def test_a_mode_that_the_samples_do_not_resolve_is_described_at_other_rates(mode, zeta, period):

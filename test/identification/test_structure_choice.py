@@ -128,7 +128,7 @@ def test_a_record_is_cut_by_its_drive():
     assert all(p.record.continues for p in pieces[1:])
 
 
-@pytest.mark.parametrize("parted", [False, True])
+@pytest.mark.parametrize("parted", [pytest.param(False, marks=pytest.mark.soak), True])
 def test_a_stage_that_rests_before_the_step_rings_as_one_that_begins_with_it(parted):
     """Also if step and sine are phases of their own, as a drive is divided on reading."""
     stage = Nanopositioner(mode=300.0)

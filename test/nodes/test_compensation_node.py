@@ -150,7 +150,7 @@ def test_a_displacement_is_set_and_a_slow_integral_removes_the_remaining_error(l
     assert "goes to its safe voltage" in node.until("set_displacement", "stopped").message
 
 
-@pytest.mark.parametrize("end", ["stop", "cancel", "kill"])
+@pytest.mark.parametrize("end", ["stop", pytest.param("cancel", marks=pytest.mark.soak), "kill"])
 def test_a_hold_that_the_driver_ended_is_not_resumed(lab, end):
     node = Compensation(lab, integral_time=0.3)
     publisher, sent = lab.publisher(Float64, "set_displacement"), lab.listen(Float64, "set_voltage")

@@ -133,7 +133,9 @@ def test_the_longest_phases_give_way_first(sizes, enough):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit is one of Linux")
-@pytest.mark.parametrize("kind", ["csv", "npz", "mat5", "mat73", "bag"])
+@pytest.mark.parametrize(
+    "kind", ["csv", "bag", *(pytest.param(k, marks=pytest.mark.soak) for k in ("npz", "mat5", "mat73"))]
+)
 def test_memory_does_not_grow_with_the_file(kind, tmp_path):
     """Ten pieces in the room in which every sample of them does not fit."""
     (tmp_path / "short").mkdir()

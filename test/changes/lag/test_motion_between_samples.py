@@ -56,7 +56,7 @@ def stage_and_model(request):
     return replace(stage, noise_seed=1), identify(played(stage), memory=True).model
 
 
-@pytest.mark.parametrize("tau", [1.6e-3, 3.2e-3])
+@pytest.mark.parametrize("tau", [1.6e-3, pytest.param(3.2e-3, marks=pytest.mark.soak)])
 def test_the_lag_of_a_filter_is_within_its_interval(stage_and_model, tau):
     """The samples of the stage without the filter have another lag than the stage, by up to half a sample."""
     stage, model = stage_and_model
@@ -68,7 +68,9 @@ def test_the_lag_of_a_filter_is_within_its_interval(stage_and_model, tau):
     assert change is not None or tau < 2.0 * PERIOD
 
 
-@pytest.mark.parametrize("factor", [0.8, 0.93, 1.06])
+@pytest.mark.parametrize(
+    "factor", [pytest.param(0.8, marks=pytest.mark.soak), pytest.param(0.93, marks=pytest.mark.soak), 1.06]
+)
 def test_a_mode_between_samples_that_has_moved_is_not_a_lag(stage_and_model, factor):
     """Only its ringing in the samples has changed, and with it their lag."""
     stage, model = stage_and_model

@@ -85,13 +85,13 @@ def change_and_records(model, **changed):
 @pytest.mark.parametrize(
     "changed",
     [
-        {"design": "bessel", "corner": 50.0},
+        pytest.param({"design": "bessel", "corner": 50.0}, marks=pytest.mark.soak),
         {"design": "bessel", "corner": 100.0},
-        {"design": "bessel", "corner": 200.0},
-        {"design": "bessel", "order": 8, "corner": 100.0},
+        pytest.param({"design": "bessel", "corner": 200.0}, marks=pytest.mark.soak),
+        pytest.param({"design": "bessel", "order": 8, "corner": 100.0}, marks=pytest.mark.soak),
         {"design": "butter", "order": 3, "corner": 100.0},
-        {"design": "butter", "corner": 50.0},
-        {"design": "butter", "corner": 200.0},
+        pytest.param({"design": "butter", "corner": 50.0}, marks=pytest.mark.soak),
+        pytest.param({"design": "butter", "corner": 200.0}, marks=pytest.mark.soak),
         {"filter_pole": 3e-3, "filter_delay": 1e-3},
     ],
     ids=str,

@@ -98,14 +98,16 @@ def with_change(drive, group):
     return np.where(np.arange(y.size) < late, y, other), late
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.soak)])
 def test_an_unchanged_stage_raises_no_alarm(drive, seed):
     watch, largest = follow(drive, run(MODEL, drive), seed)
     assert watch.alarms == 0
     assert 0.05 < largest < 1.0
 
 
-@pytest.mark.parametrize("frequency", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize(
+    "frequency", [0.3, pytest.param(1.0, marks=pytest.mark.soak), pytest.param(3.0, marks=pytest.mark.soak)]
+)
 def test_a_slow_scan_whose_blocks_differ_raises_no_alarm(frequency):
     slow = sine(TRAINED + WATCHED + 4.0, frequency)
     watch, largest = follow(slow, run(MODEL, slow))
@@ -113,7 +115,9 @@ def test_a_slow_scan_whose_blocks_differ_raises_no_alarm(frequency):
     assert 0.05 < largest < 1.0
 
 
-@pytest.mark.parametrize("frequency", [0.3, 1.0, 11.0])
+@pytest.mark.parametrize(
+    "frequency", [pytest.param(0.3, marks=pytest.mark.soak), 1.0, pytest.param(11.0, marks=pytest.mark.soak)]
+)
 def test_white_scores_vary_alike_in_all_directions_whatever_each_block_excites(frequency):
     slow = sine(TRAINED + 4.0, frequency)
     watch, _ = follow(slow, run(MODEL, slow))
@@ -338,7 +342,14 @@ def test_scores_that_are_simulated_have_the_memory_of_the_baseline(first, decay)
     assert correlation == pytest.approx([1.0, first, first * decay, first * decay**2], abs=0.02)
 
 
-@pytest.mark.parametrize(("frequency", "gamma", "noise"), [(0.37, 0.02, 1e-4), (0.37, 0.03, 5e-4), (1.0, 0.03, 5e-4)])
+@pytest.mark.parametrize(
+    ("frequency", "gamma", "noise"),
+    [
+        (0.37, 0.02, 1e-4),
+        pytest.param(0.37, 0.03, 5e-4, marks=pytest.mark.soak),
+        pytest.param(1.0, 0.03, 5e-4, marks=pytest.mark.soak),
+    ],
+)
 def test_creep_that_the_model_describes_badly_is_no_change(frequency, gamma, noise):
     """The zero moves on. In half a scan this resembles a lag or a gain, and there were 20 to 40 alarms."""
     drive = sine(130.0, frequency)
@@ -347,7 +358,7 @@ def test_creep_that_the_model_describes_badly_is_no_change(frequency, gamma, noi
     assert watch.alarms == 0 and largest < 1.0
 
 
-@pytest.mark.parametrize("group", ["gain", "dynamics", "offset"])
+@pytest.mark.parametrize("group", ["gain", *(pytest.param(g, marks=pytest.mark.soak) for g in ("dynamics", "offset"))])
 def test_a_change_beside_such_creep_has_its_name(group):
     drive = sine(160.0, 1.0)
     stage, model = (MODEL.with_effect(Creep(gamma=g, tau_min=PERIOD)) for g in (0.015, 0.02))

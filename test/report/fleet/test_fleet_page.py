@@ -147,7 +147,9 @@ def test_a_page_without_any_result_is_a_page():
     assert page.drawings == ()
 
 
-@pytest.mark.parametrize("spread", [0, 1, 5, 400, 4000])
+@pytest.mark.parametrize(
+    "spread", [0, pytest.param(1, marks=pytest.mark.soak), 5, pytest.param(400, marks=pytest.mark.soak), 4000]
+)
 def test_any_range_of_dates_has_labels(spread):
     h = history()
     days = np.linspace(0, spread, h.size).astype("timedelta64[D]")
