@@ -20,7 +20,7 @@ free run. G(1) is held, because only the product of the gains of hysteresis and 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,22 +30,22 @@ from ..errors import IdentificationError, counted
 from ..model.model import Model
 from ..model.provenance import provenance, record_errors
 from ..model.sample_periods import identified_periods
-from ..record import Notice, Record
-from .fit.fit import Progress
+from ..record import Experiment, Notice, Record
+from .fit.fit import Fit, Progress
 from .fit.form_uncertainty import ADEQUACY
 from .fit.gauge import Gauge
 from .fit.normal_equations import residuals
-from .identification import INSEPARABLE, Identification, correlated_pairs, phase_errors, undetermined
+from .identification import INSEPARABLE, Identification, PhaseError, correlated_pairs, phase_errors, undetermined
 from .identified_range import LAG_ERROR, identified_range
 from .inputs import check_gauge, experiment_of
-from .joint_fits import FitInput, fit_broadband, fit_loops, fit_structured
+from .joint_fits import FitInput, FitOutcome, fit_broadband, fit_loops, fit_structured
 from .one_core import on_one_core
 from .published_steps import delay_of_steps, published_steps
 from .records.conditioning_split import known_from_within
 from .records.excitation_check import one_way
 from .records.noise import without_voltage_noise
 from .records.one_axis import one_axis
-from .records.roles import HELD_OUT, roles_of
+from .records.roles import HELD_OUT, Roles, roles_of
 from .steps.remaining_lag import lag
 from .steps.three_steps import behind_the_gauge
 
@@ -120,17 +120,7 @@ def identify(
     roles = roles_of(recorded, held_out)
     experiment, noise_notices = without_voltage_noise(recorded)
     records = experiment.records
-    if not any(roles.contents[i].span > 0.0 for i in roles.fitted):
-        raise IdentificationError("identify: the drive does not move in any record; expected loops, steps or noise")
-    longest = max(records[i].size for i in roles.fitted if roles.contents[i].span > 0.0)
-    if longest < FEWEST_SAMPLES:
-        raise IdentificationError(
-            f"identify: got {counted(longest, 'sample')} in the longest record that moves, "
-            f"expected {FEWEST_SAMPLES} or more"
-        )
-    reach = max(float(np.ptp(r.displacement)) for r in records)
-    if reach == 0.0:
-        raise IdentificationError("identify: the displacement never changes; expected that of a stage that is driven")
+    reach = _range_of_motion(records, roles)
     natural = Gauge.natural(records, roles.loops)
     chosen_gauge = {"voltage_scale": voltage_scale, "displacement_scale": displacement_scale, "gain": gain}
     gauge = replace(natural, **{name: value for name, value in chosen_gauge.items() if value is not None})
@@ -154,29 +144,10 @@ def identify(
         found = fit_structured(inputs, natural, gauge)
     else:
         found = fit_loops(inputs)
-    notices += found.notices
     report("free run", 0.95)
+    joint = _with_zero(found)
     phases = phase_errors(found.fit.model, experiment, roles)
-    zero = float(np.mean([e.mean() for e in residuals(found.fit.model, found.records)]))
-    joint = replace(found.fit, model=found.fit.model.with_effect(Offset(y0=zero)))
-    joint = replace(joint, converged=joint.converged or joint.cost <= AT_THE_FLOOR)
-    if not joint.converged:
-        notices.append(Notice("not_converged", f"the joint fit did not converge in {joint.iterations} linearisations"))
-    notices += [Notice("at_bound", f"{name} reached a bound of its range") for name in undetermined(joint)]
-    if found.structure is None:
-        notices += [
-            Notice("not_identifiable", f"{a} and {b} are not determined separately; record whole loops", severe=True)
-            for a, b, _ in correlated_pairs(joint, INSEPARABLE)
-        ]
-    notices += one_way(found.records, roles.fitted)
-    unseen = not all(p.is_fitted for p in phases)
-    if not unseen:
-        notices.append(
-            Notice(
-                "nothing_held_out",
-                "no phase was left out, so the errors are not prediction errors; leave one out with --held-out",
-            )
-        )
+    notices += [*found.notices, *_fit_notices(joint, found, roles, phases)]
     result = Identification(
         joint.model,
         joint,
@@ -189,10 +160,61 @@ def identify(
         tuple(notices),
         found.structure,
     )
-    origin = provenance(experiment, result.free_run_error, result.free_run_percent)
-    errors = record_errors(max(p.rms for p in phases), result.moving_error, unseen)
-    origin = {**origin, **errors, **identified_range(found.records, roles.fitted)}
-    if not roles.broadband:
-        origin |= identified_periods(found.records[i].sample_period for i in roles.fitted)
-        origin |= {LAG_ERROR: f"{1.96 * lag(joint)[1]:.4g}"}
+    origin = _provenance_of(result, found, experiment, roles)
     return replace(result, model=replace(joint.stated_model, provenance=origin))
+
+
+def _range_of_motion(records: Sequence[Record], roles: Roles) -> float:
+    """Range of the displacement [m]; an error if drive or displacement do not move, or not for long enough."""
+    moving = [records[i].size for i in roles.fitted if roles.contents[i].span > 0.0]
+    if not moving:
+        raise IdentificationError("identify: the drive does not move in any record; expected loops, steps or noise")
+    if max(moving) < FEWEST_SAMPLES:
+        raise IdentificationError(
+            f"identify: got {counted(max(moving), 'sample')} in the longest record that moves, "
+            f"expected {FEWEST_SAMPLES} or more"
+        )
+    reach = max(float(np.ptp(r.displacement)) for r in records)
+    if reach == 0.0:
+        raise IdentificationError("identify: the displacement never changes; expected that of a stage that is driven")
+    return reach
+
+
+def _with_zero(found: FitOutcome) -> Fit:
+    """The joint fit, whose model has the mean residual of the records as its zero."""
+    zero = float(np.mean([e.mean() for e in residuals(found.fit.model, found.records)]))
+    fit = replace(found.fit, model=found.fit.model.with_effect(Offset(y0=zero)))
+    return replace(fit, converged=fit.converged or fit.cost <= AT_THE_FLOOR)
+
+
+def _fit_notices(fit: Fit, found: FitOutcome, roles: Roles, phases: Sequence[PhaseError]) -> list[Notice]:
+    """What a user should know about a fit before its model is used."""
+    notices = [Notice("at_bound", f"{name} reached a bound of its range") for name in undetermined(fit)]
+    if not fit.converged:
+        text = f"the joint fit did not converge in {fit.iterations} linearisations"
+        notices.insert(0, Notice("not_converged", text))
+    if found.structure is None:
+        notices += [
+            Notice("not_identifiable", f"{a} and {b} are not determined separately; record whole loops", severe=True)
+            for a, b, _ in correlated_pairs(fit, INSEPARABLE)
+        ]
+    notices += one_way(found.records, roles.fitted)
+    if all(p.is_fitted for p in phases):
+        text = "no phase was left out, so the errors are not prediction errors; leave one out with --held-out"
+        notices.append(Notice("nothing_held_out", text))
+    return notices
+
+
+def _provenance_of(result: Identification, found: FitOutcome, experiment: Experiment, roles: Roles) -> dict[str, str]:
+    """What the model file says about the data, its errors and the range in which the model was identified."""
+    unseen = not all(p.is_fitted for p in result.phases)
+    largest = max(p.rms for p in result.phases)
+    origin = {
+        **provenance(experiment, result.free_run_error, result.free_run_percent),
+        **record_errors(largest, result.moving_error, unseen),
+        **identified_range(found.records, roles.fitted),
+    }
+    if roles.broadband:
+        return origin
+    periods = identified_periods(found.records[i].sample_period for i in roles.fitted)
+    return {**origin, **periods, LAG_ERROR: f"{1.96 * lag(result.fit)[1]:.4g}"}
