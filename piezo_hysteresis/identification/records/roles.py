@@ -69,32 +69,32 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
     RecordError
         If a phase of `held_out` is missing in the experiment (except `HELD_OUT`), or no record is left to fit.
     """
-    names = ", ".join(dict.fromkeys(r.phase for r in experiment))
-    for phase in held_out:
-        if phase not in HELD_OUT and not experiment.named(phase):
-            raise RecordError(f"held_out: got phase '{phase}', expected some of {names}")
     contents = tuple(excitation_content(r) for r in experiment)
-    named = {phase: experiment.named(phase) for phase in (*held_out, CONDITIONING)}
-
-    def is_one_of(index: int, phases: Collection[str]) -> bool:
-        return any(experiment[index] is record for phase in phases for record in named[phase])
-
-    indices = range(len(experiment))
-    out = tuple(i for i in indices if is_one_of(i, held_out))
-    if len(out) == len(experiment):
-        if not set(held_out) <= set(HELD_OUT):
-            raise RecordError(f"held_out: got every phase ({names}), expected at least one that is fitted")
-        out = ()
-    left = [i for i in indices if i not in out]
-    known = tuple(i for i in left if not is_one_of(i, (CONDITIONING,)) and not experiment[i].truncated)
-    fitted = known if any(contents[i].span > 0.0 for i in known) else tuple(left)
+    out = _held_out(experiment, held_out)
+    left = [i for i in range(len(experiment)) if i not in out]
+    known = [i for i in left if not experiment[i].is_named(CONDITIONING) and not experiment[i].truncated]
+    fitted = known if any(contents[i].span > 0.0 for i in known) else left
     largest = max((contents[i].span for i in fitted), default=0.0)
-    slow = [i for i in fitted if contents[i].is_slow and contents[i].span >= LARGE * largest > 0.0]
+    moving = [i for i in fitted if contents[i].span >= LARGE * largest > 0.0]
+    slow = [i for i in moving if contents[i].is_slow]
     straight = [i for i in fitted if experiment[i].phase.split("_")[0] == "triangle"]
     triangles = [i for i in slow if i in straight]
-    moving = [i for i in fitted if contents[i].span >= LARGE * largest > 0.0]
     fastest = experiment.fastest_period
     # a triangle has few turning points and straight lines between them
     rich = [i for i in fitted if contents[i].is_broadband and i not in straight]
     broadband = [i for i in rich if experiment[i].sample_period < 1.001 * fastest]
-    return Roles(contents, fitted, out, tuple(triangles or slow or moving), tuple(broadband))
+    return Roles(contents, tuple(fitted), out, tuple(triangles or slow or moving), tuple(broadband))
+
+
+def _held_out(experiment: Experiment, phases: Collection[str]) -> tuple[int, ...]:
+    """Indices of the records that are not fitted: none if those of `HELD_OUT` are all there are."""
+    names = ", ".join(dict.fromkeys(r.phase for r in experiment))
+    for phase in phases:
+        if phase not in HELD_OUT and not experiment.named(phase):
+            raise RecordError(f"held_out: got phase '{phase}', expected some of {names}")
+    out = tuple(i for i, record in enumerate(experiment) if record.is_named(*phases))
+    if len(out) < len(experiment):
+        return out
+    if not set(phases) <= set(HELD_OUT):
+        raise RecordError(f"held_out: got every phase ({names}), expected at least one that is fitted")
+    return ()
