@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -70,14 +71,7 @@ def records_of(
         name = "record" if unlabelled else _name(slow if slow.size else segment, names, notices)
         moves = _travel(segment) > moving
         left_out = name in LEFT_OUT and name not in options.include and not (name == HOLD and moves and kept)
-        if missing := segment.lost + sum(segment.breaks.values()):
-            lost = f"{missing} samples ({missing * segment.sample_period:.3g} s) were lost"
-            places = len(segment.breaks) + (segment.lost > 0)
-            severe = not left_out and missing > _SEVERE_SHARE * (segment.size + missing)
-            notices.append(Notice("gap", f"{lost} in {places} places", name, severe))
-        if paused := sum(n for at, n in segment.pauses.items() if at):
-            held = f"{paused} samples ({paused * segment.sample_period:.3g} s) were not measured"
-            notices.append(Notice("pause", f"{held} while the device held its voltage and its memory was read", name))
+        notices += _interruptions(segment, name, left_out)
         if left_out and moves:
             text = (
                 f"the drive moved by {_travel(segment):.3g} V before the first phase; the stage is "
@@ -124,6 +118,18 @@ def records_of(
         records, more_notices = labelled(records, options.phases)
         notices += more_notices
     return records, notices
+
+
+def _interruptions(segment: Segment, name: str, left_out: bool) -> Iterator[Notice]:
+    """What was lost of a segment, and where its device did not measure."""
+    if missing := segment.lost + sum(segment.breaks.values()):
+        lost = f"{missing} samples ({missing * segment.sample_period:.3g} s) were lost"
+        places = len(segment.breaks) + (segment.lost > 0)
+        severe = not left_out and missing > _SEVERE_SHARE * (segment.size + missing)
+        yield Notice("gap", f"{lost} in {places} places", name, severe)
+    if paused := sum(n for at, n in segment.pauses.items() if at):
+        held = f"{paused} samples ({paused * segment.sample_period:.3g} s) were not measured"
+        yield Notice("pause", f"{held} while the device held its voltage and its memory was read", name)
 
 
 def _travel(segment: Segment) -> float:
