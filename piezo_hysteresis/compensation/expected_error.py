@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ExpectedError:
-    """Expected RMS error on a path [m]; it is computed from two independent errors.
+    """Expected RMS error on a path [m]: that of the plan, and that of the model.
 
     Parameters
     ----------
@@ -40,7 +40,8 @@ class ExpectedError:
     free_run : float or None
         Free-run error of the model on data that were not fitted [m]; None if the model file does not contain it.
     parameters : float or None
-        Error from the uncertainty of the parameters [m]; None if the model file does not contain a covariance.
+        Error on the path from the uncertainty of the parameters [m]; None if the model file does not contain a
+        covariance.
     """
 
     planned: float
@@ -49,13 +50,13 @@ class ExpectedError:
 
     @property
     def total(self) -> float:
-        """Root of the sum of squares of `planned` and `free_run`, or without it of `planned` and `parameters` [m].
+        """Root of the sum of squares of `planned` and the larger one of `free_run` and `parameters` [m].
 
         The free-run error was measured, and already includes the error from the parameters on that drive. Their
         uncertainty on this path can be larger, where the path goes beyond what was recorded or the records determine
         some parameters only together.
         """
-        model = self.free_run if self.free_run is not None else self.parameters or 0.0
+        model = max(self.free_run or 0.0, self.parameters or 0.0)
         return float(np.hypot(self.planned, model))
 
     def as_dict(self) -> Mapping[str, float | None]:
@@ -77,12 +78,12 @@ def free_run_error(model: Model) -> float | None:
     return value if np.isfinite(value) and value >= 0.0 else None
 
 
-def parameter_error(model: Model, voltage: Array) -> float | None:
-    """Standard error of the displacement from the covariance of the parameters [m], as RMS over a drive (n,) [V].
+def parameter_error(model: Model, voltage: Array, along: slice) -> float | None:
+    """Standard error of the displacement from the covariance of the parameters [m], as RMS over a part of a drive [V].
 
     None if the model has no covariance.
     """
     if model.covariance is None:
         return None
     (found,) = model.standard_errors([Record(voltage, np.zeros_like(voltage), model.sample_period)])
-    return float(np.sqrt(np.mean(found**2)))
+    return float(np.sqrt(np.mean(found[along] ** 2)))

@@ -172,11 +172,12 @@ def plan(
     voltage = np.concatenate((found.voltage, back))
     predicted, end = model.run(voltage, state)
     begin = way.size + inverse.preview
-    off = predicted[begin : begin + y.size] - y
+    along = slice(begin, begin + y.size)
+    off = predicted[along] - y
     expected = ExpectedError(
         float(np.sqrt(np.mean(off**2))),
         free_run_error(model),
-        parameter_error(model, voltage),
+        parameter_error(model, voltage, along),
     )
     return Plan(
         y,

@@ -28,7 +28,8 @@ from .words import nanometre
 FOOTER = (
     "This is a computation; nothing has moved. The planned error is the difference between the wanted and the "
     "simulated displacement. The expected error is the root of the sum of squares of the planned error and of the "
-    "free-run error of the model. Percentages are RMS errors over the range of the path."
+    "error of the model: its free-run error, or the uncertainty of its parameters on this path if that is larger. "
+    "Percentages are RMS errors over the range of the path."
 )
 """Explanation of the numbers."""
 MERIT = ("drive voltage", "largest slew")

@@ -195,12 +195,38 @@ def test_the_expected_error_includes_the_covariance() -> None:
     u = 3.0 * (1.0 - np.cos(np.arange(20_000) / 100.0))
     spread = 0.01
     model = replace(stage(), covariance=ParameterCovariance.of(["bouc_wen.p2"], np.array([[spread**2]])))
-    rms = parameter_error(model, u)
+    rms = parameter_error(model, u, slice(None))
     moved = model.with_values({"bouc_wen.p2": model.values()["bouc_wen.p2"] + spread})
     change = moved.run(u, moved.rest(0.0))[0] - model.run(u, model.rest(0.0))[0]
     assert rms == pytest.approx(np.sqrt(np.mean(change**2)), rel=1e-3)
     found = plan(model, triangle(50.0, 2e-6, 6e-6, 2), UNIPOLAR)
     assert found.expected.parameters is not None and found.expected.parameters > 0.0
+
+
+def test_stages_that_the_covariance_allows_miss_the_path_by_what_is_expected() -> None:
+    """The total was the free-run error, 5 nm, where the parameters were uncertain by 65 nm."""
+    spread = np.array([0.03, 0.01])
+    names = ["bouc_wen.p2", "bouc_wen.A"]
+    model = replace(stage(), covariance=ParameterCovariance.of(names, np.diag(spread**2)))
+    y = swing(50.0, 2e-6, 6e-6, 2)
+    found = plan(model, y, UNIPOLAR)
+    rng = np.random.default_rng(0)
+    missed = []
+    for change in spread * rng.normal(size=(20, 2)):
+        real = model.with_values({n: model.values()[n] + c for n, c in zip(names, change, strict=True)})
+        measured, _ = real.run(found.voltage, real.rest(0.0))
+        missed.append(np.mean((measured[found.begin : found.begin + y.size] - y) ** 2))
+    assert found.expected.total == pytest.approx(np.sqrt(np.mean(missed)), rel=0.3)
+    assert found.expected.total > 10.0 * 5e-9
+
+
+def test_neither_the_way_to_the_path_nor_the_way_back_changes_the_expected_error() -> None:
+    """A rest of 0.5 s at 0 V, where an error of the slope does not show, more than halved the uncertainty."""
+    model = replace(stage(), covariance=ParameterCovariance.of(["bouc_wen.p2"], np.array([[1e-4]])))
+    y = swing(50.0, 2e-6, 6e-6, 2)
+    found, longer = (plan(model, y, UNIPOLAR, way_back=seconds).expected for seconds in (0.0, 0.5))
+    assert found.parameters is not None and found.parameters > 1e-8
+    assert longer.parameters == pytest.approx(found.parameters) and longer.total == pytest.approx(found.total)
 
 
 def test_a_plan_for_a_model_without_a_known_error_states_this() -> None:

@@ -65,6 +65,8 @@ def described(plan: Plan, learned: float | None = None) -> str:
     expected = plan.expected
     total = expected.total if learned is None else learned
     stated = "no free-run error stated" if expected.free_run is None else f"model {1e9 * expected.free_run:.1f} nm"
+    if (expected.parameters or 0.0) > (expected.free_run or 0.0):
+        stated += f", its parameters {1e9 * (expected.parameters or 0.0):.1f} nm on this path"
     return (
         f"{plan.voltage.size * plan.sample_period:.3g} s, {plan.voltage.min():.3g} to {plan.voltage.max():.3g} V, "
         f"at most {slew_text(plan.largest_slew, 4)}, expected error {1e9 * total:.1f} nm rms"
