@@ -95,7 +95,7 @@ class BandFilter(InvertedBlock):
         self.noise_gain = float(np.abs(taps).sum())
         self._taps = padded(taps)
 
-    def start(self, x0: float, state: State) -> State:
+    def start(self, x0: float, state: State, ahead: int) -> State:
         return x0, np.zeros(self._taps.size - 1)
 
     def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:

@@ -135,7 +135,7 @@ class Inverse:
         numbers = [self.chain.labels.index(label) for label in kept.labels]  # the states are those of the whole model
         numbered = list(zip(numbers, kept.blocks, strict=True))
         self._before, after = numbered[: len(terms)], numbered[len(terms) :]
-        own = [(k, _inverted(b, self.chain.labels[k])) for k, b in after]
+        own = [(k, _inverted(b, self.chain.labels[k], self.chain.blocks[k])) for k, b in after]
         own += [(k, HeldDeviation(b)) for k, b in enumerate(self.chain.blocks) if self.chain.labels[k] in impossible]
         own.sort(key=lambda item: -item[0])
         inverted: list[tuple[int | None, InvertedBlock]] = [(k, stage) for k, stage in own if stage is not None]
@@ -161,18 +161,18 @@ class Inverse:
         return self.resume(self.chain.rest(voltage, time))
 
     def resume(self, state: ChainState) -> InverseState:
-        """State of the inverse for a stage whose model is in `state`; the dynamics are taken as settled.
+        """State of the inverse for a stage whose model is in `state`; a softened mode is taken as settled.
 
         ModelError for the state of a model of other effects.
         """
         self.chain.require_own(state)
         started = tuple(
-            stage.start(state.inputs[-1] if k is None else state.inputs[k], None if k is None else state.blocks[k])
-            for k, stage in self._stages
+            stage.start(state.inputs[-1 if k is None else k], None if k is None else state.blocks[k], ahead)
+            for (k, stage), ahead in zip(self._stages, self._ahead, strict=True)
         )
         if self._stages and self._stages[0][0] is None:
             reading = self.chain.blocks[-1].static(state.inputs[-1])
-            started = (self._stages[0][1].start(reading, None), *started[1:])
+            started = (self._stages[0][1].start(reading, None, self._ahead[0]), *started[1:])
         before = [(block, state.inputs[k], state.blocks[k]) for k, block in self._before]
         nonlinear = self._nonlinear.start(*zip(*before, strict=True))
         return InverseState(started, nonlinear, state.time, 0)
@@ -256,7 +256,8 @@ def _terms_of_nonlinear_part(blocks: Sequence[Block], labels: Sequence[str]) -> 
     return terms
 
 
-def _inverted(block: Block, label: str) -> InvertedBlock | None:
-    """The inverse that a block declares, by its sections or in `Block.inverted`."""
-    sections = block.sections()
-    return InvertedLinear(block, sections, label) if sections else block.inverted(label)
+def _inverted(block: Block, label: str, whole: Block) -> InvertedBlock | None:
+    """The inverse that a block declares, by its sections or in `Block.inverted`; `whole` is that of the whole model."""
+    if sections := block.sections():
+        return InvertedLinear(block, sections, label, type(whole) is type(block))
+    return block.inverted(label)

@@ -39,7 +39,7 @@ class HeldDeviation(InvertedBlock):
     def __init__(self, block: Block) -> None:
         self._block = block
 
-    def start(self, x0: float, state: State) -> State:
+    def start(self, x0: float, state: State, ahead: int) -> State:
         y, _ = self._block.run(np.array([x0]), state)
         return float(y[0]) - x0
 

@@ -49,8 +49,8 @@ class InvertedBlock(ABC):
     is_exact: bool = True
     noise_gain: float = 1.0
 
-    def start(self, x0: float, state: State) -> State:
-        """State from the last input of the block and the state of the block."""
+    def start(self, x0: float, state: State, ahead: int) -> State:
+        """State from the last input of the block and its state; the first x of `run` is `ahead` samples later."""
         return None
 
     @abstractmethod

@@ -110,9 +110,15 @@ class LinearInverse:
 
 
 class InvertedLinear(InvertedBlock):
-    """Inverse of sections of linear dynamics in series."""
+    """Inverse of sections of linear dynamics in series.
 
-    def __init__(self, block: Block, sections: Iterable[Section], name: str) -> None:
+    A block that still moves at the start, after an earlier drive, would move on by itself if its input were held. The
+    inputs add to this motion, because the block is linear, so it is subtracted from the wanted output. A block in which
+    an effect was left out starts settled, because its states are not those of the model (`continues` is false).
+    """
+
+    def __init__(self, block: Block, sections: Iterable[Section], name: str, continues: bool) -> None:
+        self._block, self._continues = block, continues
         slope, _ = block.static_slopes(0.0)
         own = list(sections)
         gains = [slope] if len(own) == 1 else [float(b.sum() / a.sum()) for b, a in own]
@@ -121,19 +127,28 @@ class InvertedLinear(InvertedBlock):
         self.is_exact = all(i.is_exact for i in self.inverses)
         self.noise_gain = float(np.prod([i.noise_gain for i in self.inverses]))
 
-    def start(self, x0: float, state: State) -> State:
+    def start(self, x0: float, state: State, ahead: int) -> State:
+        moving = None
+        if self._continues and (state[0] != x0 or state[1].any()):
+            held = np.full(self.preview + ahead, x0)
+            moving = x0, self._block.run(held, state)[1] if held.size else state
         states = []
         for inverse in self.inverses[::-1]:
             states.append(inverse.rest(x0))
             x0 = inverse.gain * x0
-        return tuple(states[::-1])
+        return tuple(states[::-1]), moving
 
     def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:
+        own, moving = state
+        if moving is not None:
+            x0, before = moving
+            free, after = self._block.run(np.full(y.size, x0), before)
+            y, moving = y - (free - self._block.static(x0)), (x0, after)
         states = []
-        for inverse, s in zip(self.inverses, state, strict=True):
+        for inverse, s in zip(self.inverses, own, strict=True):
             y, s = inverse.run(y, s)
             states.append(s)
-        return y, tuple(states)
+        return y, (tuple(states), moving)
 
     def c_form(self, ahead: int) -> CForm:
         parts = {f"section_{k}": inverse.c_form() for k, inverse in enumerate(self.inverses)}

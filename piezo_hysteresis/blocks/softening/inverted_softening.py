@@ -38,13 +38,16 @@ def force_for(x, x0, p, z, w):
 
 
 class InvertedSoftening(InvertedBlock):
-    """Inverse of a softened mode that drives the rest of G: first the rest, then the force on the mode."""
+    """Inverse of a softened mode that drives the rest of G: first the rest, then the force on the mode.
+
+    It starts settled.
+    """
 
     def __init__(self, settled: StaticSoftening, loop: Array, path: LinearInverse) -> None:
         self.settled, self.loop, self.path = settled, loop, path
         self.preview, self.is_exact, self.noise_gain = path.preview, path.is_exact, path.noise_gain
 
-    def start(self, x0: float, state: State) -> State:
+    def start(self, x0: float, state: State, ahead: int) -> State:
         settled = self.settled.static(x0)
         return x0, self.path.rest(settled), np.zeros(2)
 

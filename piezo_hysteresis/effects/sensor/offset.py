@@ -114,7 +114,7 @@ class InvertedOffset(InvertedBlock):
     def __init__(self, block: OffsetBlock) -> None:
         self.block = block
 
-    def start(self, x0: float, state: State) -> State:
+    def start(self, x0: float, state: State, ahead: int) -> State:
         return state
 
     def run(self, y: Array, state: State, time: Array) -> tuple[Array, State]:

@@ -114,18 +114,15 @@ class PathRuns:
         """
         near, deadline = _REST * (limits.voltage_max - limits.voltage_min), time.monotonic() + _STARTED_WITHIN
         while True:
-            watched = time.monotonic() + _REST_TIME
-            found: Plan = yield from _in_thread(self.planned, applied, wanted, limits)
-            while time.monotonic() < watched:
-                yield
-            begin = found.start.inputs[0]
+            begin = applied.voltage
+            yield from _rest()
             if abs(applied.voltage - begin) <= near:
-                return found
+                found: Plan = yield from _in_thread(self.planned, applied, wanted, limits)
+                begin = found.start.inputs[0]
+                if abs(applied.voltage - begin) <= near:
+                    return found
             if time.monotonic() > deadline:
-                raise StageError(
-                    f"the stage moves: it is at {applied.voltage:.4g} V, and was at {begin:.4g} V when the path was "
-                    "planned; let it come to rest"
-                )
+                raise StageError(f"the stage moves from {begin:.4g} to {applied.voltage:.4g} V; let it come to rest")
 
     def follow(self, name: str, applied: AppliedState, wanted: np.ndarray, limits: Limits) -> Job:
         """Plan a path and play it.
@@ -224,6 +221,7 @@ class PathRuns:
                     f"the stage is claimed by {printable(self._driver.holder) or 'nobody'}, not by this node"
                 )
             tracking = yield from self._play(f"{name}_{number}", learning.next, learning)
+            yield from _rest()
             yield from _in_thread(learning.update, tracking.measured, applied.state)
             now = learning.rounds[-1]
             reason = f"round {number}: {1e9 * now.rms:.1f} nm rms, expected {1e9 * now.expected:.1f} nm"
@@ -239,6 +237,13 @@ class PathRuns:
             f"; {learning.reason}" if learning.reason else ""
         )
         self._status.show("done", reason, name, rms=last.rms, expected=last.expected, best=learning.best.rms)
+
+
+def _rest() -> Job:
+    """Wait until fast motion has ended: a plan continues from the present one, and its drive begins later."""
+    begin = time.monotonic()
+    while time.monotonic() < begin + _REST_TIME:
+        yield
 
 
 def _in_thread(compute: Callable[..., Any], *arguments: object) -> Generator[None, None, Any]:
