@@ -104,7 +104,7 @@ def reachable(
         kept = direction * (float(aim[worst]) - lowest) >= -tolerance
         part = _part(model, limits, needed[a : b + free.preview + 1], a, b + 1, float(off[worst]))
         if no_voltage[worst]:
-            part = replace(part, limit="model")
+            part = replace(part, limit="model", other_limits=())
         if kept and part.limit == "voltage_min":  # a drive that is only too late would still get there
             _, moved = model.run(given[played : worst + limited.preview + 1], moved)
             played = worst + limited.preview + 1
@@ -167,7 +167,8 @@ def _part(model: Model, limits: Limits, needed: Array, begin: int, end: int, lar
     limit = max(beyond, key=lambda name: beyond[name])
     if beyond[limit] <= 0.0 and without_amplifier_limits(model) is not model:
         limit = "amplifier"
-    return UnreachablePart(period * begin, period * end, largest, low, high, slew, limit)
+    others = tuple(name for name in beyond if name != limit and beyond[name] > 0.0)
+    return UnreachablePart(period * begin, period * end, largest, low, high, slew, limit, others)
 
 
 def _at_the_lowest_voltage(model: Model, limits: Limits) -> tuple[float, float]:

@@ -44,6 +44,8 @@ class UnreachablePart:
         The limit that is exceeded most: ``voltage_min``, ``voltage_max`` or ``max_slew_rate``; ``amplifier`` if the
         drive is inside its limits, but not inside those of the amplifier of the model; ``model`` if no voltage gives
         the displacement.
+    other_limits : tuple of str
+        Other limits of the drive that are exceeded.
     after_loop : bool
         True if the displacement can be reached from rest, but not after the preceding motion, because of the
         hysteresis.
@@ -56,18 +58,20 @@ class UnreachablePart:
     needed_max: float
     needed_slew: float
     limit: str
+    other_limits: tuple[str, ...] = ()
     after_loop: bool = False
 
     def __str__(self) -> str:
         slew = slew_text(self.needed_slew, 4)
-        needed = {
+        statements = {
             "voltage_min": f"{self.needed_min:.3g} V, below voltage_min",
             "voltage_max": f"{self.needed_max:.3g} V, above voltage_max",
             "max_slew_rate": f"{slew}, above max_slew_rate",
             "amplifier": f"{self.needed_min:.3g} to {self.needed_max:.3g} V with up to {slew}, more than the amplifier "
             "of the model gives",
             "model": "a displacement that no voltage gives in the model",
-        }[self.limit]
+        }
+        needed = ", and ".join(statements[limit] for limit in (self.limit, *self.other_limits))
         message = (
             f"the path cannot be reached from {self.begin:.4g} to {self.end:.4g} s: it needs {needed}; the error would "
             f"be up to {1e9 * abs(self.largest):.0f} nm"

@@ -112,6 +112,19 @@ def test_too_high_and_too_fast_are_distinguished() -> None:
     assert max(p.needed_slew for p in fast.parts) > 1e3
 
 
+def test_every_limit_that_a_part_exceeds_is_named() -> None:
+    """A fast rise beyond voltage_max was said to be too high only; with more volts it was too steep."""
+    y = swing(100.0, 2e-6, 18e-6, 1)
+    (part,) = plan(stage(), y, Limits(0.0, 8.0, 2e3)).reachability.parts
+    assert part.limit == "voltage_max" and part.other_limits == ("max_slew_rate",)
+    assert part.needed_max > 8.0 and part.needed_slew > 2e3
+    assert "above voltage_max, and" in str(part) and "above max_slew_rate" in str(part)
+    higher = plan(stage(), y, Limits(0.0, 20.0, 2e3)).reachability.parts
+    assert {(part.limit, part.other_limits) for part in higher} == {("max_slew_rate", ())}
+    slower = plan(stage(), y, Limits(0.0, 8.0)).reachability.parts
+    assert {(part.limit, part.other_limits) for part in slower} == {("voltage_max", ())}
+
+
 @pytest.mark.parametrize(
     "limit",
     [AmplifierSaturation(upper=4.5), AmplifierSlewLimit(S=300.0), AmplifierSlewLimitSettling(S=300.0, tau=1e-4)],

@@ -106,6 +106,7 @@ def answer(found: Plan) -> dict[str, Any]:
                 "end_s": p.end,
                 "largest_m": p.largest,
                 "limit": p.limit,
+                "other_limits": list(p.other_limits),
                 "needed_min_V": p.needed_min,
                 "needed_max_V": p.needed_max,
                 "needed_slew_V_per_s": p.needed_slew,
