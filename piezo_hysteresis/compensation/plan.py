@@ -23,9 +23,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ModelError
+from ..identification.identified_range import outside_of
 from ..model.chain import ChainState
 from ..model.model import Model
 from ..model.samples import samples
+from ..record import Record
 from .approach import APPROACH, settled_start, smooth_transition
 from .band import Band
 from .expected_error import ExpectedError, free_run_error, parameter_error
@@ -65,6 +67,8 @@ class Plan:
         State of the model before and after the drive.
     band : Band
         Low-pass filter of the path.
+    beyond : tuple of str
+        Where the drive leaves what the model was identified on; the error can exceed the expected one there.
     start_is_known : bool
         False if the stage was driven before its voltages were received: the error can then exceed the expected one.
     """
@@ -82,6 +86,7 @@ class Plan:
     start: ChainState
     end: ChainState
     band: Band
+    beyond: tuple[str, ...] = ()
     start_is_known: bool = True
 
     @property
@@ -193,4 +198,5 @@ def plan(
         state,
         end,
         band,
+        tuple(said.message for said in outside_of(model, Record(voltage, voltage, model.sample_period))),
     )

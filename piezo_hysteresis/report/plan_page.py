@@ -58,7 +58,7 @@ def plan_page(plan: Plan, model: Model, source: str) -> Page:
         headline = f"The stage can follow the whole path; the expected error is {nanometre(total)} rms"
     else:
         headline = "The limits of the drive do not allow the whole path"
-    verdict = VerdictText(headline, tuple(f"{line[:1].upper()}{line[1:]}." for line in notes(plan, model)))
+    verdict = VerdictText(headline, tuple(f"{line[:1].upper()}{line[1:]}." for line in notes(plan)))
     html = framed(
         "Compensation: a plan", source, chain(model), verdict, tuple(merit), {"Plan": ([drawing], [table])}, FOOTER
     )

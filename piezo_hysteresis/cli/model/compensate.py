@@ -131,7 +131,7 @@ def run(args: argparse.Namespace) -> int:
         out.print(
             f"note: the path has no times; its rows are taken at the model's sample period, {model.sample_period:g} s"
         )
-    for line in notes(found, model):
+    for line in notes(found):
         out.print(line)
     if not found.reachability.is_whole and not args.allow_partial:
         out.print("no command was written; change the path, or give --allow-partial to write what the limits allow")

@@ -33,7 +33,7 @@ from ..identification.wait_limit import WaitLimit
 from .applied_state import AppliedState
 from .status import CompensationStatus
 from .tracking import Tracking
-from .trajectory import described, doubt, why_not
+from .trajectory import described, doubts, why_not
 
 TICK = 0.02
 """Period at which a job goes on [s]."""
@@ -148,7 +148,7 @@ class PathRuns:
 
     def _report_result(self, name: str, tracking: Tracking) -> None:
         rms, expected = tracking.rms or 0.0, tracking.plan.expected.total
-        reason = f"{1e9 * rms:.1f} nm rms, expected {1e9 * expected:.1f} nm{doubt(tracking.plan)}"
+        reason = f"{1e9 * rms:.1f} nm rms, expected {1e9 * expected:.1f} nm{doubts(tracking.plan)}"
         self._status.show("done", reason, name, first_index=tracking.path_index, rms=rms, expected=expected)
 
     def _play(

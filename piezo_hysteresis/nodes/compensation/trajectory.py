@@ -72,12 +72,17 @@ def described(plan: Plan, learned: float | None = None) -> str:
         f"at most {slew_text(plan.largest_slew, 4)}, expected error {1e9 * total:.1f} nm rms"
         + (f" (plan {1e9 * expected.planned:.1f} nm, {stated}), " if total == expected.total else ", ")
         + ("the whole path is reachable" if plan.reachability.is_whole else why_not(plan))
-        + doubt(plan)
+        + doubts(plan)
     )
 
 
+def doubts(plan: Plan) -> str:
+    """Why the error on a path can exceed the expected one; empty if nothing speaks for it."""
+    return doubt(plan) + "".join(f"; {said}; the error may be larger there" for said in plan.beyond)
+
+
 def doubt(plan: Plan) -> str:
-    """Why the error can exceed the expected one; empty if nothing speaks for it."""
+    """`doubts` about the start alone."""
     if plan.start_is_known:
         return ""
     return "; the stage was driven before its voltages were received, so that the error can be larger"

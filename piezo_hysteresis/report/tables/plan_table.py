@@ -20,10 +20,7 @@ from typing import Any
 
 from ...compensation.plan import Plan
 from ...errors import counted
-from ...identification.identified_range import outside_of
-from ...model.model import Model
 from ...parameter import slew_text
-from ...record import Record
 from ..words import nanometre
 from .table import Table
 
@@ -55,15 +52,14 @@ def plan_table(found: Plan) -> Table:
     return Table("Plan", ("quantity", "value"), rows)
 
 
-def notes(found: Plan, model: Model) -> list[str]:
+def notes(found: Plan) -> list[str]:
     """Notes on the plan: where it leaves what the model was identified on, effects left out, and unreachable parts."""
     lines = [
         f"caution: {name} has no inverse and was left out; the error above includes the effect of this"
         for name in found.left_out
     ]
     lines += [f"note: {name} does not depend on the drive and is not compensated" for name in found.not_on_path]
-    drive = Record(found.voltage, found.voltage, found.sample_period, initial_voltage=float(found.voltage[0]))
-    beyond = [f"caution: {said.message}; the error may be larger there" for said in outside_of(model, drive)]
+    beyond = [f"caution: {said}; the error may be larger there" for said in found.beyond]
     return [*beyond, *lines, *(f"caution: {line}" for line in refusal(found))]
 
 
@@ -99,6 +95,7 @@ def answer(found: Plan) -> dict[str, Any]:
         "voltage_max_V": float(found.voltage.max()),
         "largest_slew_V_per_s": found.largest_slew,
         "expected_error": dict(found.expected.as_dict()),
+        "beyond_model": list(found.beyond),
         "reachable": found.reachability.is_whole,
         "unreachable": [
             {

@@ -71,9 +71,10 @@ def test_a_path_outside_of_what_the_model_was_identified_on_is_told(piezo, tmp_p
     place = model_file.save(stated, tmp_path / "slow.yaml")
     write(tmp_path / "path.csv", 1.0, 3.0)
     words = ("compensate", place, tmp_path / "path.csv", "-o", tmp_path / "command.npz")
-    done = piezo(*words, "--report", tmp_path / "page.html")
+    done = piezo(*words, "--report", tmp_path / "page.html", "--json", tmp_path / "plan.json")
     assert "the model was identified up to" in done.out
     assert "the model was identified up to" in (tmp_path / "page.html").read_text()
+    assert "the model was identified up to" in json.loads((tmp_path / "plan.json").read_text())["beyond_model"][0]
 
 
 def test_terminal_page_and_json_contain_the_same_numbers(piezo, model, tmp_path):
