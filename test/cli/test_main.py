@@ -168,6 +168,7 @@ NOBODY = "there is no home folder of that user, expected another path"
         ("simulate -o {place}/s --plant {fine}", "unknown quantity"),
         ("simulate -o {place}/s --plant {fine}", "expected names without the heading of a ROS node"),
         ("diagnose --stage {node} -o {place}/s", "'ros__parameters' under the heading '/**:'"),
+        ("diagnose --stage {node} -o {place}/s --correction {place}/c.npz", "a name that ends in .yaml"),
         ("simulate -o {place}/s --plant {broken}", "broken YAML"),
         ("simulate -o {place}/s --noise -1", "sensor.noise"),
         ("simulate -o {place}/s --sample-period 1", "sample period"),

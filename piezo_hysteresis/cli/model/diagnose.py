@@ -124,6 +124,8 @@ def _of_stage(args: argparse.Namespace) -> LiveDiagnosis:
         )
     for option, path in (("--report", args.report), ("--json", args.json), ("--correction", args.correction)):
         require_new_file(option, path, args.force)
+    if args.correction is not None:
+        model_file.require_name(args.correction)
     return diagnose_stage(args)
 
 

@@ -84,7 +84,7 @@ def require_new_file(option: str, path: str | None, force: bool | None = None) -
     Raises
     ------
     RecordingError
-        If it exists, or its folder does not.
+        If it exists, or its folder does not, or the folder cannot be written.
     """
     if path is None:
         return
@@ -94,6 +94,7 @@ def require_new_file(option: str, path: str | None, force: bool | None = None) -
         raise RecordingError(f"{option}: {place} exists already, expected a new file; choose another name or {way_out}")
     if not place.absolute().parent.is_dir():
         raise RecordingError(f"{option}: {place.parent} is no folder, expected one that exists; create it")
+    _require_writable(option, place.absolute().parent)
 
 
 def require_new_experiment(option: str, path: str) -> None:
@@ -116,9 +117,7 @@ def require_new_experiment(option: str, path: str) -> None:
     empty = place.is_dir() and place.suffix not in (".csv", ".mat") and not any(place.iterdir())
     if (place.exists() or place.is_symlink()) and not empty:
         raise RecordingError(f"{option}: {place} exists already, expected a new name; choose another one or remove it")
-    parent = next(folder for folder in place.absolute().parents if folder.exists())
-    if not (parent.is_dir() and os.access(parent, os.W_OK | os.X_OK)):
-        raise RecordingError(f"{option}: {place} cannot be made in {parent}, expected a folder that can be written")
+    _require_writable(option, place.absolute().parent)
 
 
 def require_new_folder(option: str, path: str | None, force: bool) -> None:
@@ -136,7 +135,7 @@ def require_new_folder(option: str, path: str | None, force: bool) -> None:
     Raises
     ------
     RecordingError
-        If it is a file or not empty.
+        If it is a file or not empty, or cannot be made or written.
     """
     if path is None:
         return
@@ -148,3 +147,11 @@ def require_new_folder(option: str, path: str | None, force: bool) -> None:
             f"{option}: {place} holds files already, expected an empty or a new folder; choose another name or give "
             "--force to write into it"
         )
+    _require_writable(option, place.absolute())
+
+
+def _require_writable(option: str, folder: Path) -> None:
+    """Refuse a folder if it cannot be written, or cannot be made where it is missing."""
+    present = next(place for place in (folder, *folder.parents) if place.exists())
+    if not (present.is_dir() and os.access(present, os.W_OK | os.X_OK)):
+        raise RecordingError(f"{option}: got a place in {present}, expected a folder that can be written")
