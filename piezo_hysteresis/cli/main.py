@@ -23,6 +23,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+from contextlib import redirect_stdout
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -78,22 +79,41 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # units and symbols must not end a command on another encoding
     chosen = next((a for a in arguments if not a.startswith("-")), None)
     try:
-        args = _parser(chosen).parse_args(arguments)
+        args = _arguments(chosen, arguments)
         status = int(args.run(args))
         sys.stdout.flush()
         return status
     except IdentificationError as error:
         return _print_error(error, NOT_IDENTIFIABLE)
     except (PiezoError, OSError) as error:
+        _drop_unwritable()
         if isinstance(error, BrokenPipeError):
-            # the reader of the output has ended: leave nothing for the interpreter to flush
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return BROKEN_PIPE
         return _print_error(error, BAD_INPUT)
     except MemoryError:
         return _print_error("the recording does not fit into memory; decimate it or give fewer rows", BAD_INPUT)
     except KeyboardInterrupt as interrupt:
         return _print_error(": ".join(["interrupted", *map(str, interrupt.args)]), INTERRUPTED)
+
+
+def _arguments(chosen: str | None, arguments: Sequence[str]) -> argparse.Namespace:
+    """Parse; a help that cannot be written is an error, although argparse ignores it."""
+    said = io.StringIO()
+    try:
+        with redirect_stdout(said):
+            return _parser(chosen).parse_args(arguments)
+    except SystemExit:
+        sys.stdout.write(said.getvalue())
+        sys.stdout.flush()
+        raise
+
+
+def _drop_unwritable() -> None:
+    """Leave nothing for the interpreter to flush if the output has ended or its disk is full."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser(chosen: str | None) -> argparse.ArgumentParser:

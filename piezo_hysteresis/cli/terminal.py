@@ -43,11 +43,19 @@ LINE_INTERVAL = 10.0
 """Time between two lines of progress in a file [s]."""
 
 
+class Output(Console):
+    """A console that leaves the end of the reader to `main`; that of rich would exit with the status of bad data."""
+
+    def on_broken_pipe(self) -> None:
+        """Raise the `BrokenPipeError` again, for which rich calls this."""
+        raise
+
+
 def console() -> Console:
     """Standard output: lines end between words on a terminal, and are as long as they need elsewhere."""
     is_terminal = sys.stdout.isatty()
     width = None if is_terminal else max(WIDTH, shutil.get_terminal_size().columns)
-    return Console(file=sys.stdout, highlight=False, markup=False, width=width, soft_wrap=not is_terminal)
+    return Output(file=sys.stdout, highlight=False, markup=False, width=width, soft_wrap=not is_terminal)
 
 
 def show(*tables: Table | None) -> None:

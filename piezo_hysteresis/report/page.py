@@ -84,13 +84,13 @@ class Page:
         """
         folder = path.with_name(f"{path.stem}_figures")
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
             with whole_file(path) as draft:
                 draft.write_text(self.html, encoding="utf-8")
-            for drawing in self.drawings:
-                drawing.save(folder)
         except OSError as error:
             raise RecordingError(f"{path}: {error.strerror or error}; expected a folder that can be written") from None
+        for drawing in self.drawings:
+            drawing.save(folder)
 
 
 def page(

@@ -26,7 +26,7 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis import recording
-from piezo_hysteresis.cli.main import COMMANDS, INTERRUPTED
+from piezo_hysteresis.cli.main import BROKEN_PIPE, COMMANDS, INTERRUPTED
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.model import model_file
 from piezo_hysteresis.model.model import Model
@@ -71,6 +71,26 @@ def test_a_terminal_without_greek_letters_does_not_end_a_command(encoding):
     command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "effects", "creep"]
     done = subprocess.run(command, capture_output=True, check=False, env={**os.environ, "PYTHONIOENCODING": encoding})
     assert (done.returncode, done.stderr) == (0, b"") and b"1/decade" in done.stdout
+
+
+@pytest.mark.parametrize("words", [["--help"], ["identify", "--help"], ["--version"], ["effects"]])
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_output_that_does_not_fit_on_the_disk_is_an_error(words, unbuffered):
+    command = [sys.executable, "-m", "piezo_hysteresis.cli.main", *words]
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    with open("/dev/full", "w") as disk:
+        done = subprocess.run(command, stdout=disk, stderr=subprocess.PIPE, text=True, check=False, env=environment)
+    assert done.returncode == 2
+    assert done.stderr == "piezo: [Errno 28] No space left on device\n"
+
+
+def test_the_end_of_a_reader_has_a_status_of_its_own():
+    command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "effects"]
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (BROKEN_PIPE, b"")
 
 
 def test_a_closed_output_pipe_is_not_an_error():

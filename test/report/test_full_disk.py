@@ -18,8 +18,10 @@ import resource
 from contextlib import contextmanager
 
 import pytest
+from matplotlib.figure import Figure
 
 from piezo_hysteresis.errors import RecordingError
+from piezo_hysteresis.report.figures.drawing import Drawing
 from piezo_hysteresis.report.json_file import read_json, write_json
 from piezo_hysteresis.report.page import Page
 
@@ -51,3 +53,9 @@ def test_an_answer_of_before_is_kept(tmp_path):
         write_json(str(path), {"verdict": "unknown" * 10_000})
     assert read_json(str(path)) == {"verdict": "named"}
     assert [p.name for p in tmp_path.iterdir()] == ["answer.json"]
+
+
+def test_a_figure_that_cannot_be_written_is_named(tmp_path):
+    drawing = Drawing("gap", "", "", "", Figure(), {})
+    with disk_of(100), pytest.raises(RecordingError, match="figures/gap: File too large"):
+        drawing.save(tmp_path / "figures")

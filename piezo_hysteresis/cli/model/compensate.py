@@ -159,5 +159,4 @@ def _save(found: Plan, place: Path) -> None:
 def _draw(found: Plan, folder: Path) -> None:
     from ...report.figures.tracking import tracking
 
-    folder.mkdir(parents=True, exist_ok=True)
     tracking(found).save(folder)

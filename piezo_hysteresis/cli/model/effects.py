@@ -24,6 +24,7 @@ from rich.table import Column, Table
 
 from ...effects import BASELINE, CHAIN, UNNAMED, Effect, effect_named
 from ...parameter import Parameter
+from ..terminal import Output
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -41,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     ModelError
         If the catalogue has no effect of that name.
     """
-    console = Console(file=sys.stdout, highlight=False)
+    console = Output(file=sys.stdout, highlight=False)
     if args.name is None:
         console.print(listing())
         console.print("For the details of one effect, type: piezo effects NAME")

@@ -193,7 +193,6 @@ def _draw(comparison: ModelComparison, folder: Path) -> None:
     from ...report.figures.time_series import time_series
     from ...report.figures.whiteness import whiteness
 
-    folder.mkdir(parents=True, exist_ok=True)
     for figure in (gap, time_series, whiteness):
         drawing = figure(comparison)
         if drawing is not None:

@@ -111,11 +111,22 @@ class Drawing:
             raise RecordingError(f"{path}: {error.strerror or error}, expected a file that can be written") from None
 
     def save(self, folder: Path) -> None:
-        """Write ``name.svg``, ``name.png`` and ``name.csv`` into a folder."""
-        (folder / f"{self.name}.svg").write_text(self.svg(), encoding="utf-8")
-        with mpl.rc_context(SETTINGS):
-            self.figure.savefig(folder / f"{self.name}.png", metadata={"Software": None})
-        (folder / f"{self.name}.csv").write_text(self.csv(), encoding="utf-8")
+        """Write ``name.svg``, ``name.png`` and ``name.csv`` into a folder, which is made if it is missing.
+
+        Raises
+        ------
+        RecordingError
+            If a file cannot be written.
+        """
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / f"{self.name}.svg").write_text(self.svg(), encoding="utf-8")
+            with mpl.rc_context(SETTINGS):
+                self.figure.savefig(folder / f"{self.name}.png", metadata={"Software": None})
+            (folder / f"{self.name}.csv").write_text(self.csv(), encoding="utf-8")
+        except OSError as error:
+            place = folder / self.name
+            raise RecordingError(f"{place}: {error.strerror or error}, expected a figure that can be written") from None
 
 
 def _cell(value: object) -> str:
