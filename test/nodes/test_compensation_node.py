@@ -14,6 +14,7 @@
 
 """The compensation node and a real driver: the stage goes where it was sent, or nothing moves."""
 
+import itertools
 import signal
 from dataclasses import replace
 
@@ -169,6 +170,22 @@ def test_a_hold_that_the_driver_ended_is_not_resumed(lab, end):
     lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")
     lab.pause(1.0)
     assert len(sent) == before and abs(node.samples.newest.voltage[-1]) < 1e-3
+
+
+def test_the_first_path_after_the_driver_was_killed_is_played_by_the_next_one(lab):
+    """It was sent before the new driver had found this node, to the killed one, which is still listed."""
+    node = Compensation(lab)
+    node.driver.signal(signal.SIGKILL)
+    node.driver.wait()
+    lab.driver(**DRIVER, real_time_factor=1.0)
+    for number in itertools.count():
+        node.send(scan(), f"path_{number}")
+        ended = node.until(f"path_{number}", "done", "refused", "failed")
+        if values_of(ended)["state"] != "refused":  # until its limits are known
+            break
+        lab.pause(0.3)
+    assert values_of(ended)["state"] == "done", ended.message
+    assert node.samples.voltage.max() > 1.0
 
 
 def test_displacements_in_quick_succession_end_at_the_last_one(lab):

@@ -43,7 +43,8 @@ from ..runtime.process import run
 from ..runtime.sending import send
 from ..topics import advertise, subscribe
 from .applied_state import AppliedState, check_period
-from .path_runs import TICK, Job, PathError, PathRuns
+from .job import TICK, Job
+from .path_runs import PathError, PathRuns
 from .set_point import SetPoint, volts_per_metre
 from .settings import COMPENSATION
 from .status import ENDED, CompensationStatus
@@ -250,8 +251,7 @@ class CompensationNode(GuardedNode):
             self._give_up()
         effect = "the driver goes to its safe voltage" if asked else "there is no driver to stop"
         self._status.show("stopped", f"on request; {effect}", ended)
-        response.success = asked is not None
-        response.message = f"stopped; {effect}" if asked else effect
+        response.success, response.message = asked is not None, f"stopped; {effect}" if asked else effect
         return response
 
 

@@ -16,10 +16,8 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Generator, Mapping
-from concurrent.futures import Future
 from dataclasses import replace
 from typing import Any
 
@@ -31,20 +29,17 @@ from ...identification.protocol.phases import ProtocolPhase
 from ..identification.driver_client import DriverClient
 from ..identification.wait_limit import WaitLimit
 from .applied_state import AppliedState
+from .job import TICK, Job, in_thread, rest
 from .status import CompensationStatus
 from .tracking import Tracking
 from .trajectory import described, doubts, why_not
 
-TICK = 0.02
-"""Period at which a job goes on [s]."""
 _STARTED_WITHIN = 20.0
 """Longest wait for the driver to begin with a waveform, or for its last samples [s]."""
-
-_REST, _REST_TIME = 0.01, 0.2
-"""Largest change of the drive of a stage at rest, as a share of its range, and shortest time for which it is watched
-[s]."""
-
-Job = Generator[None]
+_HEARD_WITHIN = 3.0
+"""Time after which a drive without an answer is sent again [s]: a driver that has just started may not hear it."""
+_REST = 0.01
+"""Largest change of the drive of a stage at rest, as a share of its range."""
 
 
 class PathError(StageError):
@@ -115,9 +110,9 @@ class PathRuns:
         near, deadline = _REST * (limits.voltage_max - limits.voltage_min), time.monotonic() + _STARTED_WITHIN
         while True:
             begin = applied.voltage
-            yield from _rest()
+            yield from rest()
             if abs(applied.voltage - begin) <= near:
-                found: Plan = yield from _in_thread(self.planned, applied, wanted, limits)
+                found: Plan = yield from in_thread(self.planned, applied, wanted, limits)
                 begin = found.start.inputs[0]
                 if abs(applied.voltage - begin) <= near:
                     return found
@@ -164,12 +159,17 @@ class PathRuns:
         tracking = self.tracking = Tracking(found, None if learning is None else learning.wanted)
         expected = found.expected.total if learning is None else learning.expected
         self._status.show("playing", described(found, expected), name, expected=expected)
-        self._driver.send(ProtocolPhase(name, found.voltage, found.sample_period))
+        drive = ProtocolPhase(name, found.voltage, found.sample_period)
+        self._driver.send(drive)
         # a device that plays from its memory sends nothing before the end
         longest_silence = _STARTED_WITHIN + 2.0 * found.voltage.size * found.sample_period
-        before, limit = (False, 0), WaitLimit(_STARTED_WITHIN)
+        before, limit, unheard = (False, 0), WaitLimit(_STARTED_WITHIN), WaitLimit(_HEARD_WITHIN)
         while not tracking.is_whole:
             state = self._driver.state
+            if state != "sent":
+                unheard = WaitLimit(_HEARD_WITHIN)
+            elif unheard.has_passed():
+                self._driver.send(drive)
             if state in ("refused", "stopped"):
                 raise StageError(f"the driver {state} it: {self._driver.reason}")
             if self._driver.limits is None:
@@ -221,8 +221,8 @@ class PathRuns:
                     f"the stage is claimed by {printable(self._driver.holder) or 'nobody'}, not by this node"
                 )
             tracking = yield from self._play(f"{name}_{number}", learning.next, learning)
-            yield from _rest()
-            yield from _in_thread(learning.update, tracking.measured, applied.state)
+            yield from rest()
+            yield from in_thread(learning.update, tracking.measured, applied.state)
             now = learning.rounds[-1]
             reason = f"round {number}: {1e9 * now.rms:.1f} nm rms, expected {1e9 * now.expected:.1f} nm"
             index = tracking.path_index
@@ -237,26 +237,3 @@ class PathRuns:
             f"; {learning.reason}" if learning.reason else ""
         )
         self._status.show("done", reason, name, rms=last.rms, expected=last.expected, best=learning.best.rms)
-
-
-def _rest() -> Job:
-    """Wait until fast motion has ended: a plan continues from the present one, and its drive begins later."""
-    begin = time.monotonic()
-    while time.monotonic() < begin + _REST_TIME:
-        yield
-
-
-def _in_thread(compute: Callable[..., Any], *arguments: object) -> Generator[None, None, Any]:
-    """Compute in a thread of its own. Neither the next job nor the end of the process waits for it after a stop."""
-    future: Future[Any] = Future()
-
-    def call() -> None:
-        try:
-            future.set_result(compute(*arguments))
-        except BaseException as error:
-            future.set_exception(error)
-
-    threading.Thread(target=call, name="plan", daemon=True).start()
-    while not future.done():
-        yield
-    return future.result()
