@@ -12,11 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`reachable`: the parts of a path that cannot be reached inside the limits, and the nearest path that can."""
+"""`reachable`: the parts of a path that cannot be reached inside the limits."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -27,23 +26,17 @@ from ..effects.drive.amplifier_saturation import UNLIMITED
 from ..model.chain import ChainState
 from ..model.model import Model
 from ..model.samples import samples
-from .approach import APPROACH, settled_start, smooth_transition
+from .approach import APPROACH, settled_start
 from .band import Band
 from .expected_error import free_run_error
 from .inverse import Inverse
 from .limits import Limits
-from .reachability import NearestPath, Reachability, UnreachablePart
+from .reachability import Reachability, UnreachablePart
 
 Array = NDArray[np.float64]
 
 LEAST, MOST = 1e-4, 1e-2
 """Deviations below the free-run error of the model count as zero; these shares of the range of the path bound it."""
-
-STEPS = 8
-"""Number of bisection steps in the search for the nearest path, after the first trial that works."""
-
-FIRST_TRIALS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 0.99)
-"""First trials of the search for the nearest path, as shares of the largest change."""
 
 
 def reachable(
@@ -54,7 +47,6 @@ def reachable(
     start: ChainState | None = None,
     band: Band | None = None,
     approximate: bool = False,
-    search: bool = True,
 ) -> Reachability:
     """Compare a path with and without the limits of the drive and of the amplifier, from the model alone.
 
@@ -70,8 +62,6 @@ def reachable(
         State of the model before the path. Default: at rest at 0 V, or at the limit that is nearest to it.
     band, approximate
         As for `Inverse`.
-    search : bool
-        Also search for the nearest path that can be reached.
 
     Returns
     -------
@@ -111,10 +101,7 @@ def reachable(
             held, _ = model.run(settling, moved)
             part = replace(part, after_loop=direction * (float(held[-1]) - float(aim[worst])) > tolerance)
         parts.append(part)
-    nearest = None
-    if parts and search:
-        nearest = nearest_path(model, limits, y, state, band=band, approximate=approximate)
-    return Reachability(tuple(parts), nearest, reached, given)
+    return Reachability(tuple(parts), reached, given)
 
 
 def without_amplifier_limits(model: Model) -> Model:
@@ -181,73 +168,3 @@ def _at_the_lowest_voltage(model: Model, limits: Limits) -> tuple[float, float]:
     higher = min(limits.voltage_max, limits.voltage_min + model.voltage_scale)
     at, above = (float(model.run([u], model.rest(u))[0][0]) for u in (limits.voltage_min, higher))
     return at, float(np.sign(above - at))
-
-
-def nearest_path(
-    model: Model,
-    limits: Limits,
-    y: Array,
-    state: ChainState,
-    *,
-    band: Band | None = None,
-    approximate: bool = False,
-    approach: float = APPROACH,
-) -> NearestPath:
-    """The nearest path that can be reached, after an approach from the present position of the stage.
-
-    Parameters
-    ----------
-    model, limits, band, approximate
-        As for `reachable`.
-    y : (n,) ndarray
-        Displacement of the path, without the approach [m].
-    state : ChainState
-        State of the model before the approach.
-    approach : float
-        Duration of the approach [s].
-    """
-    span, middle = float(np.ptp(y)), 0.5 * float(y.min() + y.max())
-
-    def is_whole(path: Array, low_pass: Band | None = band) -> bool:
-        return reachable(
-            model, limits, path, start=state, band=low_pass, approximate=approximate, search=False
-        ).is_whole
-
-    at_start = float(model.run([state.inputs[0]], state)[0][0])
-
-    def with_approach(path: Array) -> Array:
-        """The path after an approach from the present position of the stage."""
-        way = smooth_transition(at_start, float(path[0]), round(approach / model.sample_period))
-        return np.concatenate((way, path))
-
-    most = span or model.displacement_scale
-    shifts = [_smallest(lambda c, s=s: is_whole(with_approach(y + s * c)), most) for s in (1, -1)]  # type: ignore[misc]
-    offsets = [s * c for s, c in zip((1.0, -1.0), shifts, strict=True) if c is not None]
-    shrink = _smallest(lambda c: is_whole(with_approach(middle + (1.0 - c) * (y - middle))), 1.0)
-    usual = Band.of(model.sample_period)
-
-    def slower(c: float) -> Band:
-        return Band(usual.passed * 2.0 ** (-8.0 * c), usual.stopped * 2.0 ** (-8.0 * c), 0.02)
-
-    lower = _smallest(lambda c: is_whole(with_approach(y), slower(c)), 1.0)
-    return NearestPath(
-        min(offsets, key=abs, default=None),
-        None if shrink is None or shrink >= 1.0 else 1.0 - shrink,
-        None if lower is None else usual.passed * 2.0 ** (-8.0 * lower),
-    )
-
-
-def _smallest(works: Callable[[float], bool], most: float) -> float | None:
-    """Smallest change up to `most` that works, found by bisection; None if none of `FIRST_TRIALS` works.
-
-    A change that is larger than necessary may not work either.
-    """
-    tried = [0.0, *(most * share for share in FIRST_TRIALS)]
-    found = next((k for k in range(1, len(tried)) if works(tried[k])), None)
-    if found is None:
-        return None
-    low, high = tried[found - 1], tried[found]
-    for _ in range(STEPS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if works(middle) else (middle, high)
-    return high

@@ -32,8 +32,9 @@ from .approach import APPROACH, settled_start, smooth_transition
 from .band import Band
 from .expected_error import ExpectedError, free_run_error, parameter_error
 from .inverse import Inverse
-from .limit_check import nearest_path, reachable
+from .limit_check import reachable
 from .limits import Limits
+from .nearest_path import nearest_path
 from .reachability import Reachability
 
 Array = NDArray[np.float64]
@@ -165,7 +166,7 @@ def plan(
     at = float(model.run([state.inputs[0]], state)[0][0])
     way = smooth_transition(at, float(y[0]), round(approach / model.sample_period))
     whole = np.concatenate((way, y))
-    found = reachable(model, limits, whole, start=state, band=band, approximate=approximate, search=False)
+    found = reachable(model, limits, whole, start=state, band=band, approximate=approximate)
     if found.parts:  # what is changed is the path alone: the approach begins where the stage is
         nearest = nearest_path(model, limits, y, state, band=band, approximate=approximate, approach=approach)
         found = replace(found, nearest=nearest)

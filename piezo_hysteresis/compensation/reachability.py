@@ -122,18 +122,18 @@ class Reachability:
     ----------
     parts : tuple of UnreachablePart
         Unreachable parts; empty if the whole path is reachable.
-    nearest : NearestPath or None
-        Nearest reachable path; None if the whole path is reachable, or if there was no search.
     displacement : (n,) ndarray
         Displacement under the limited drive [m].
     voltage : (n + preview,) ndarray
         The limited drive [V].
+    nearest : NearestPath, optional
+        Nearest reachable path, which `plan` searches for if not the whole path is reachable.
     """
 
     parts: tuple[UnreachablePart, ...]
-    nearest: NearestPath | None
     displacement: Array
     voltage: Array
+    nearest: NearestPath | None = None
 
     @property
     def is_whole(self) -> bool:

@@ -49,7 +49,7 @@ def test_a_path_within_reach_is_planned_to_the_band() -> None:
 def test_zero_after_a_loop_on_unipolar_drive_needs_a_negative_voltage() -> None:
     y = swing(50.0, 0.0, 6e-6, 2)
     model = stage()
-    found = reachable(model, UNIPOLAR, y)
+    found = plan(model, y, UNIPOLAR).reachability
     assert not found.is_whole
     first = found.parts[0]
     assert first.limit == "voltage_min" and first.needed_min < 0.0 and first.after_loop and first.largest > 0.0
@@ -64,6 +64,15 @@ def test_zero_after_a_loop_on_unipolar_drive_needs_a_negative_voltage() -> None:
     less = plan(model, y + 0.5 * nearest.offset, UNIPOLAR)
     assert not less.reachability.is_whole, "the nearest is no farther than it must be"
     assert reachable(model, Limits(-2.0, 10.0), y).is_whole
+
+
+@pytest.mark.parametrize("low", [22e-6, 40e-6, 1e-3, -5e-6])
+def test_a_small_path_far_outside_the_range_is_shifted_into_it(low: float) -> None:
+    y = swing(50.0, low, low + 1e-6, 2)
+    nearest = plan(stage(), y, UNIPOLAR).reachability.nearest
+    assert nearest is not None and nearest.offset is not None
+    assert plan(stage(), y + nearest.offset, UNIPOLAR).reachability.is_whole
+    assert not plan(stage(), y + nearest.offset - np.sign(nearest.offset) * 1e-7, UNIPOLAR).reachability.is_whole
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.8, 1.4), (0.5, 1.1)])
@@ -89,9 +98,9 @@ def test_only_what_rest_reaches_is_said_to_be_kept_by_the_hysteresis(sign: float
     loop = BoucWen()
     numbers = {name: sign * loop[name] for name in ("A", "p1", "p2", "gamma")} | {"beta": loop["beta"]}
     model = stage().with_effect(BoucWen(**numbers))
-    after = reachable(model, UNIPOLAR, sign * swing(50.0, 0.0, 6e-6, 1), search=False)
+    after = reachable(model, UNIPOLAR, sign * swing(50.0, 0.0, 6e-6, 1))
     assert after.parts[-1].after_loop and "keeps the stage beyond it" in str(after.parts[-1])
-    outside = reachable(model, UNIPOLAR, -sign * swing(50.0, 0.0, 1e-6, 1), search=False)
+    outside = reachable(model, UNIPOLAR, -sign * swing(50.0, 0.0, 1e-6, 1))
     assert {(part.limit, part.after_loop) for part in outside.parts} == {("voltage_min", False)}
 
 
@@ -99,13 +108,13 @@ def test_what_waiting_reaches_is_not_said_to_be_kept_by_the_hysteresis() -> None
     """To fall fast, a stage with a lag of 1 ms needs a negative voltage. It has no hysteresis."""
     y = swing(200.0, 1e-7, 5e-6, 2)
     slow = stage().with_effect(Arx(a=[-0.98], b=[0.02], delay=0)).with_values({"bouc_wen.A": 0.0})
-    found = reachable(slow, UNIPOLAR, y, search=False)
+    found = reachable(slow, UNIPOLAR, y)
     assert {(part.limit, part.after_loop) for part in found.parts} == {("voltage_min", False)}
 
 
 def test_too_high_and_too_fast_are_distinguished() -> None:
     model = stage()
-    high = reachable(model, Limits(0.0, 4.0), swing(20.0, 1e-6, 12e-6, 1), search=False)
+    high = reachable(model, Limits(0.0, 4.0), swing(20.0, 1e-6, 12e-6, 1))
     assert {p.limit for p in high.parts} >= {"voltage_max"}
     fast = plan(model, triangle(200.0, 2e-6, 6e-6, 4), Limits(0.0, 10.0, 1e3)).reachability
     assert {p.limit for p in fast.parts} == {"max_slew_rate"}
@@ -171,18 +180,18 @@ def test_what_is_missed_by_less_than_the_model_knows_is_reachable() -> None:
     _, start = model.run(drive, model.rest(0.0))
     y, _ = model.run(drive, start)
     assert free_run_error(model) == 5e-9
-    assert reachable(model, UNIPOLAR, y - 4e-9, start=start, search=False).is_whole
+    assert reachable(model, UNIPOLAR, y - 4e-9, start=start).is_whole
     exact = replace(model, provenance={})
-    parts = reachable(exact, UNIPOLAR, y - 4e-9, start=start, search=False).parts
+    parts = reachable(exact, UNIPOLAR, y - 4e-9, start=start).parts
     assert {part.limit for part in parts} == {"voltage_min"}
     assert 1e-9 < max(part.largest for part in parts) < 5e-9
     poor = replace(model, provenance={"free_run_error": "1e-6"})
-    assert not reachable(poor, UNIPOLAR, y - 1e-7, start=start, search=False).is_whole
+    assert not reachable(poor, UNIPOLAR, y - 1e-7, start=start).is_whole
 
 
 @pytest.mark.parametrize("metres", [0.5, 1.0, -1.0, 1e3])
 def test_a_path_in_micrometres_is_out_of_reach(metres: float) -> None:
-    assert not reachable(stage(), UNIPOLAR, np.full(16, metres), search=False).is_whole
+    assert not reachable(stage(), UNIPOLAR, np.full(16, metres)).is_whole
 
 
 def test_the_way_back_ends_at_the_first_voltage_inside_the_slew_limit() -> None:
@@ -283,10 +292,10 @@ def test_the_nearest_band_is_reachable_and_not_much_lower_than_it_must_be(seed: 
         return 1e-5 * np.append(approach, 1.0 + 1e5 * window * parts[frequency <= highest].sum(axis=0))
 
     limits = Limits(-20.0, 40.0, float(rng.uniform(1500.0, 3500.0)))
-    found = reachable(model, limits, below(np.inf))
+    found = plan(model, below(np.inf), limits).reachability
     assert {p.limit for p in found.parts} == {"max_slew_rate"}
     band = found.nearest.band if found.nearest else None
     assert band is not None and band < 1000.0
     assert f"components above {band:.3g} Hz are removed" in found.nearest.conditions()
-    assert reachable(model, limits, below(band), search=False).is_whole
-    assert not reachable(model, limits, below(2.5 * band), search=False).is_whole
+    assert reachable(model, limits, below(band)).is_whole
+    assert not reachable(model, limits, below(2.5 * band)).is_whole
