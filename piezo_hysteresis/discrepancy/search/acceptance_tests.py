@@ -34,7 +34,7 @@ SHOWN = 0.005
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
 """Smallest number of mains periods in a record, longest sample period in mains periods, smallest number of records."""
 STEADY = 0.3
-"""Smallest ratio of the quartiles of the amplitude of hum, and of the median to the mean of its gain."""
+"""Smallest share of the gain of hum that hum of the lower quartile of its power explains."""
 UNCERTAIN = 0.05
 """Probability of a size at least as large without the effect, up to which the effect is certain."""
 PEAKS = 3.0
@@ -47,7 +47,7 @@ def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
     if gain < LEAST_GAIN:
         lowers = f"lowers mean ln R² by {_below(gain)}" if gain >= SHOWN else "does not lower mean ln R²"
         return Rejection(best.name, f"in cross-validation it {lowers}, and a decrease by {LEAST_GAIN:g} is needed")
-    if best.name == MainsHum.name and not (is_steady(best) and gains_in_most(best, before)):
+    if best.name == MainsHum.name and not is_steady(best, before):
         return Rejection(best.name, "its amplitude depends on the drive, which mains hum does not")
     if not exceeds_voltage_noise(best):
         return Rejection(best.name, "it changes the voltage no more than the noise with which it was measured")
@@ -69,47 +69,41 @@ def _below(gain: float) -> str:
 def is_certain(candidate: FittedCandidate) -> bool:
     """Whether the size of an effect differs from none by more than the uncertainty of the model's form.
 
-    A Wald test of all its numbers that are known when the effect is off; hum, which is free in every record, has none.
+    A Wald test of all its numbers that are known when the effect is off, with the others, such as a time constant, as
+    they were found: without the effect they do not exist, and a size may be known only together with them. They count
+    as degrees of freedom. Hum, which is free in every record, has none.
     """
     data, model = candidate.training_data, candidate.fit.model
     noise = data.floors if data.noise is None else data.noise
     free, span = data.free_with(model), stroke(data.records)
     fit = with_form_uncertainty(candidate.fit, data.records, free, data.floors, noise, span)
     now, off = fit.values, model.with_effect(candidate.effect.off()).values()
-    own = [n for n in fit.names if n.partition(".")[0] == candidate.name and model.row(n).off is not None]
-    sizes = [n for n in own if fit.standard_errors[n] > 0.0]
+    own = [n for n in fit.names if n.partition(".")[0] == candidate.name and fit.standard_errors[n] > 0.0]
+    sizes = [n for n in own if model.row(n).off is not None]
     if not sizes:
         return True
-    away = np.array([(now[n] - off[n]) / fit.standard_errors[n] for n in sizes])
-    likeness = np.array([[fit.correlation(n, m) for m in sizes] for n in sizes])
-    return bool(away @ np.linalg.pinv(likeness, hermitian=True) @ away > chdtri(len(sizes), UNCERTAIN))
+    precision = np.linalg.pinv([[fit.correlation(n, m) for m in own] for n in own], hermitian=True)
+    away = np.array([(now[n] - off[n]) / fit.standard_errors[n] if n in sizes else 0.0 for n in own])
+    return bool(away @ precision @ away > chdtri(len(own), UNCERTAIN))
 
 
-def is_steady(hum: FittedCandidate) -> bool:
-    """Whether hum has about the same amplitude in all records, because it does not depend on the drive.
+def is_steady(hum: FittedCandidate, before: Score) -> bool:
+    """Whether hum of the same amplitude in every record, which does not depend on the drive, explains what is gained.
 
     Hum is free in every record, also in those that cross-validation leaves out. It can take up what another effect
-    leaves at the mains frequency and its harmonics.
+    leaves at the mains frequency and its harmonics, in the records whose drive moves at them.
     """
     data = hum.training_data
     lines = 2 * data.free_with(hum.fit.model).harmonics
-    found = [
-        np.hypot(free[-lines::2], free[1 - lines :: 2])
-        for free, resolved in zip(hum.fit.nuisances, _resolve(hum), strict=True)
-        if resolved and free.size >= lines
-    ]
-    if len(found) < FEWEST:
+    powers = np.array([0.5 * np.sum(free[-lines:] ** 2) for free in hum.fit.nuisances])
+    shown = np.array(_resolve(hum))
+    if np.sum(shown) < FEWEST:
         return True
-    strongest = np.array(found)[:, np.argmax(np.mean(np.square(found), axis=0))]
-    low, high = np.quantile(strongest, (0.25, 0.75))
-    return bool(low > STEADY * high)
-
-
-def gains_in_most(hum: FittedCandidate, before: Score) -> bool:
-    """Whether hum also lowers the error of a typical record, and not only of those with a drive at its harmonics."""
-    counted = np.isfinite(hum.training_data.floors)
-    gains = (before.logs - hum.score.logs)[np.array(_resolve(hum))[counted]]
-    return bool(gains.size < FEWEST or np.median(gains) > STEADY * (before.cost - hum.score.cost))
+    counted = np.isfinite(data.floors)
+    kept = shown[counted]
+    left = data.floors[shown] ** 2 * np.exp(hum.score.logs[kept])
+    owed = np.log1p(np.quantile(powers[shown], 0.25) / left)
+    return bool(np.mean(owed) > STEADY * np.mean((before.logs - hum.score.logs)[kept]))
 
 
 def _resolve(hum: FittedCandidate) -> list[bool]:

@@ -87,14 +87,16 @@ def _bends_dynamics(candidate: Candidate) -> bool:
     return effect.place is ChainPosition.DRIVE or effect.host is not None
 
 
-def refits_of_twins(candidates: Sequence[Candidate], best: FittedCandidate, before: Score) -> list[FittedCandidate]:
-    """Refits of candidates that are equal to the best one on slow drives; only other dynamics separate them.
+def refits_of_relatives(candidates: Sequence[Candidate], best: FittedCandidate, before: Score) -> list[FittedCandidate]:
+    """Refits of candidates that are equal to the best one on slow drives, and of its other laws if an error remains.
 
     Each refit begins with the fitted model of the best one, because the loop is the same.
     """
-    twins = [c for c in candidates if c.effect.is_twin_of(best.effect)]
+    law = best.effect.public_name() if leaves_room(best.score) else None
+    others = [c for c in candidates if c.name != best.name]
+    related = [c for c in others if c.effect.is_twin_of(best.effect) or c.effect.public_name() == law]
     from_best = partial(refit, best.fit.model.without(best.name), max_iterations=LATER)
-    return collected(partial(settled, before=before), collected(from_best, twins))
+    return collected(partial(settled, before=before), collected(from_best, related))
 
 
 def _anew(candidate: FittedCandidate) -> FittedCandidate:
