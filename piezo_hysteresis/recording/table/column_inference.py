@@ -57,17 +57,19 @@ def unit_in(title: str, channel: str) -> str | None:
 def unit_of(title: str, channel: str, given: Collection[str]) -> str | None:
     """The unit of `unit_in`; a displacement whose title has another unit needs one that is `given`.
 
-    A drive may be the command of a controller in any unit.
+    Text in square brackets is a unit, a number is not. A drive may be the command of a controller in any unit.
 
     Raises
     ------
     RecordingError
         If the title of a displacement ends in another unit in brackets, e.g. volts, and `given` lacks the channel.
     """
-    match = _UNIT.search(title.strip().strip('#"'))
-    unit = match[1] if match else None
+    words = title.strip().strip('#"').strip()
+    match = _UNIT.search(words)
+    unit = (match[1] if match else None) or ""
     is_length = quantity_of(channel) == "displacement"
-    if is_length and channel not in given and unit and is_unit(unit) and unit_in(title, channel) is None:
+    stated = is_unit(unit) or (words.endswith("]") and not unit.isdecimal())
+    if is_length and channel not in given and unit and stated and unit_in(title, channel) is None:
         raise RecordingError(
             f"{channel}: got the unit '{unit}' in the title '{title.strip()}', expected one of "
             f"{', '.join(units_of(channel))}; give the SI value of one {plain(unit)} by `units`, e.g. {channel}=2e-6, "

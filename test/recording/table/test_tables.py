@@ -419,7 +419,7 @@ def test_one_gap_is_one_place(tmp_path):
     assert messages["gap"] == "10 samples are missing in 1 place"
 
 
-@pytest.mark.parametrize("title", ["sensor (V)", "Position [mV]", "displacement (s)"])
+@pytest.mark.parametrize("title", ["sensor (V)", "Position [mV]", "displacement (s)", "Position [counts]", "sensor [%]"])
 def test_a_displacement_in_a_unit_that_is_no_length_is_not_read_as_metres(tmp_path, title):
     (tmp_path / "t.csv").write_text(text(",", f"time_s,voltage_V,{title}\n"))
     with pytest.raises(RecordingError, match=r"displacement: got the unit .* give the SI value of one"):
@@ -429,3 +429,11 @@ def test_a_displacement_in_a_unit_that_is_no_length_is_not_read_as_metres(tmp_pa
     (record,) = read(tmp_path / "t.csv", phases="x", units={"displacement": 2e-6})
     (metres,) = read(tmp_path / "t.csv", phases="x", units={"displacement": "m"})
     np.testing.assert_allclose(record.displacement, 2e-6 * metres.displacement)
+
+
+@pytest.mark.parametrize("title", ["Position [0]", "Position (front)", "sensor"])
+def test_a_number_or_a_remark_in_a_title_is_no_unit(tmp_path, title):
+    (tmp_path / "t.csv").write_text(text(",", f"time_s,voltage_V,{title}\n"))
+    (metres,) = read(tmp_path / "t.csv", phases="x", units={"displacement": "m"})
+    (record,) = read(tmp_path / "t.csv", phases="x")
+    np.testing.assert_array_equal(record.displacement, metres.displacement)
