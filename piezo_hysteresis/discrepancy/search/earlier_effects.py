@@ -27,20 +27,25 @@ from ...effects import Effect
 from .acceptance_tests import is_certain
 from .candidate_refits import LEAST_GAIN, best_of_each, leaves_room, settled, simplest
 from .candidates import FittedCandidate, screen
-from .refit import LATER, Fitted, collected, refit, without
+from .refit import LATER, Fitted, collected, converged, refit, without
 from .selection_result import Rejection, Step
 
 
 def certain(steps: Sequence[Step]) -> list[Step]:
     """The steps without the effects whose intervals, beside all others, do not exclude that they are absent.
 
-    Only the last model shows this: while an effect is missing, the misfit makes the intervals of others wide.
+    Only the last model shows this: while an effect is missing, the misfit makes the intervals of others wide. Its fit
+    is converged before an effect is refused.
     """
-    kept = list(steps)
+    kept, is_precise = list(steps), False
     while accepted := [step for step in kept if step.accepted]:
         doubtful = (step for step in reversed(accepted) if not is_certain(_beside_newest(step, accepted)))
         if (step := next(doubtful, None)) is None:
             break
+        if not is_precise:
+            precise = replace(accepted[-1], best=converged(accepted[-1].best))
+            kept, is_precise = [*accepted[:-1], precise, *kept[len(accepted) :]], True
+            continue
         rejected = Rejection(step.best.name, "its interval does not exclude that it is absent")
         if step is accepted[-1]:
             kept = [*accepted[:-1], replace(step, accepted=False, rivals=(), rejected=(rejected, *step.rejected))]

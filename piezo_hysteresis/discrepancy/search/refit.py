@@ -122,11 +122,20 @@ def proceed(candidate: FittedCandidate) -> FittedCandidate:
     return _refitted(candidate.fit.model, candidate, LATER, candidate.fit.linearised) or candidate
 
 
+def converged(candidate: FittedCandidate) -> FittedCandidate:
+    """The refit continued to a precise optimum, where its interval says whether the effect may be absent."""
+    return _refitted(candidate.fit.model, candidate, LAST, candidate.fit.linearised, PRECISE) or candidate
+
+
 def _refitted(
-    model: Model, candidate: Candidate, max_iterations: int, known: Linearised | None = None
+    model: Model,
+    candidate: Candidate,
+    max_iterations: int,
+    known: Linearised | None = None,
+    tolerance: float = TOLERANCE,
 ) -> FittedCandidate | None:
     try:
-        result = joint(model, candidate.training_data, max_iterations, known=known)
+        result = joint(model, candidate.training_data, max_iterations, tolerance, known)
         score = score_model(result.model, candidate.training_data, result.linearised)
     except FAILURES:
         return None

@@ -43,6 +43,7 @@ from .candidate_refits import (
 )
 from .candidates import Candidate, FittedCandidate, screen
 from .earlier_effects import certain, in_best_laws, needed
+from .refit import converged
 from .selection_result import Rejection, Selection, Step
 from .training_data import TrainingData
 
@@ -179,4 +180,6 @@ def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> Re
 def _judged(refits: list[FittedCandidate], before: Score) -> tuple[FittedCandidate, Rejection | None]:
     """The best refit, and the rejection of its effect or None."""
     best = finest(simplest(refits), before)
+    if before.excess <= ADEQUATE:  # its interval decides
+        best = converged(best)
     return best, first_rejection(best, before)

@@ -22,6 +22,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from piezo_hysteresis.discrepancy.search.acceptance_tests import is_certain
 from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, leaves_room, refits_of_relatives
 from piezo_hysteresis.discrepancy.search.candidates import Candidate, score_model
 from piezo_hysteresis.discrepancy.search.earlier_effects import certain, in_best_laws, needed
@@ -119,6 +120,16 @@ def test_no_effect_is_named_beside_later_ones_if_its_interval_does_not_exclude_t
     assert kept.accepted and kept.best.name == CREEP.name
     assert DRIFT.name not in kept.best.fit.model
     assert [r.name for r in kept.rejected] == [DRIFT.name]
+
+
+def test_a_fit_that_stopped_early_refuses_no_effect():
+    """A pole of 6.5 µs, which might have been absent, was refused; the optimum of the fit was the hidden 35.5 µs."""
+    (step,) = steps_with((CREEP,), (CREEP,))
+    early = refit(step.best.fit.model.without(CREEP.name), replace(step.best, effect=Creep(gamma=1e-6)), 1)
+    assert not is_certain(early)
+    (kept,) = certain([replace(step, best=early)])
+    assert kept.accepted
+    assert kept.best.effect["gamma"] == pytest.approx(CREEP["gamma"], rel=0.01)
 
 
 def test_the_law_of_an_effect_is_chosen_again_when_another_effect_was_found():

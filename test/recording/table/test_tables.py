@@ -419,7 +419,9 @@ def test_one_gap_is_one_place(tmp_path):
     assert messages["gap"] == "10 samples are missing in 1 place"
 
 
-@pytest.mark.parametrize("title", ["sensor (V)", "Position [mV]", "displacement (s)", "Position [counts]", "sensor [%]"])
+@pytest.mark.parametrize(
+    "title", ["sensor (V)", "Position [mV]", "displacement (s)", "Position [counts]", "sensor [%]"]
+)
 def test_a_displacement_in_a_unit_that_is_no_length_is_not_read_as_metres(tmp_path, title):
     (tmp_path / "t.csv").write_text(text(",", f"time_s,voltage_V,{title}\n"))
     with pytest.raises(RecordingError, match=r"displacement: got the unit .* give the SI value of one"):
