@@ -119,7 +119,7 @@ def settled(candidate: FittedCandidate, before: Score) -> FittedCandidate:
     while True:
         cost = candidate.fit.cost
         candidate = proceed(candidate)
-        if candidate.score.excess <= ADEQUATE or before.cost - candidate.score.cost < 0.5 * LEAST_GAIN:
+        if not leaves_room(candidate.score) or before.cost - candidate.score.cost < 0.5 * LEAST_GAIN:
             break
         candidate = restart(candidate, LATER)
         if not candidate.fit.cost <= WORTHWHILE * cost:  # nor after a cost that is no number
