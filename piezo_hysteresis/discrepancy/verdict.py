@@ -27,6 +27,7 @@ from ..identification.fit.form_uncertainty import ADEQUACY
 from ..identification.records.noise_floor import ADEQUATE
 from ..record import Notice
 from .gap import Gap
+from .search.acceptance_tests import FAR
 from .search.selection_result import Selection
 
 FEWEST_RECORDS = 4
@@ -37,8 +38,6 @@ error in floors²) of the training records is a little high. Above the second va
 the training records is low."""
 NAMED, NAMED_FAR = 0.6, 0.75
 """Smallest explained fraction of the gap for a name, and the same if the remaining error is large."""
-FAR = 10.0
-"""V above which the remaining error is large: a similar effect of another family may explain as much of the gap."""
 
 CHOSEN = (
     "the saved model has the structure that predicts best in cross-validation; it explains {} of the gap of the "

@@ -29,8 +29,9 @@ from ...identification.fit.cross_validation import Score
 from ...identification.fit.form_uncertainty import PIECES
 from ...identification.records.noise_floor import ADEQUATE
 from ..diagnosis import Diagnosis
+from ..search.acceptance_tests import FAR
 from ..search.selection_result import Step
-from ..verdict import FAR, NAMED, NAMED_FAR, Verdict
+from ..verdict import NAMED, NAMED_FAR, Verdict
 from .time_to_decide import ONE_RECORD
 
 NOTHING, NONE_OF_THESE = "nothing", "none of these"

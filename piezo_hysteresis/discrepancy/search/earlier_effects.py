@@ -24,7 +24,7 @@ from dataclasses import replace
 from functools import partial
 
 from ...effects import Effect
-from .acceptance_tests import is_certain
+from .acceptance_tests import FAR, is_certain
 from .candidate_refits import LEAST_GAIN, best_of_each, leaves_room, settled, simplest
 from .candidates import FittedCandidate, screen
 from .refit import LATER, Fitted, collected, converged, refit, without
@@ -32,21 +32,21 @@ from .selection_result import Rejection, Step
 
 
 def certain(steps: Sequence[Step]) -> list[Step]:
-    """The steps without the effects whose intervals, beside all others, do not exclude that they are absent.
+    """The steps without the effects that may be absent beside all others.
 
     Only the last model shows this: while an effect is missing, the misfit makes the intervals of others wide. Its fit
     is converged before an effect is refused.
     """
     kept, is_precise = list(steps), False
     while accepted := [step for step in kept if step.accepted]:
-        doubtful = (step for step in reversed(accepted) if not is_certain(_beside_newest(step, accepted)))
-        if (step := next(doubtful, None)) is None:
+        found = _possibly_absent(accepted) or _outweighed(accepted)
+        if found is None:
             break
         if not is_precise:
             precise = replace(accepted[-1], best=converged(accepted[-1].best))
             kept, is_precise = [*accepted[:-1], precise, *kept[len(accepted) :]], True
             continue
-        rejected = Rejection(step.best.name, "its interval does not exclude that it is absent")
+        step, rejected = found
         if step is accepted[-1]:
             kept = [*accepted[:-1], replace(step, accepted=False, rivals=(), rejected=(rejected, *step.rejected))]
             continue
@@ -55,6 +55,30 @@ def certain(steps: Sequence[Step]) -> list[Step]:
             break
         kept = [*fewer, *kept[len(accepted) :]]
     return kept
+
+
+def _possibly_absent(accepted: Sequence[Step]) -> tuple[Step, Rejection] | None:
+    """The newest step whose effect may be absent by its interval, and the rejection; None if there is none."""
+    for step in reversed(accepted):
+        if not is_certain(_beside_newest(step, accepted)):
+            return step, Rejection(step.best.name, "its interval does not exclude that it is absent")
+    return None
+
+
+def _outweighed(accepted: Sequence[Step]) -> tuple[Step, Rejection] | None:
+    """The step whose effect explains least, if it explains less than a large error that remains, and the rejection.
+
+    Such an error is one of form, and the effect may only imitate a part of it.
+    """
+    remains = accepted[-1].best.score.excess
+    if remains <= FAR or len(accepted) == 1:
+        return None
+    alone = [(step, without(_beside_newest(step, accepted))) for step in accepted]
+    left = {step: fitted.score.excess for step, fitted in alone if fitted is not None}
+    least = min(left, key=lambda step: left[step], default=None)
+    if least is None or left[least] > 2.0 * remains:
+        return None
+    return least, Rejection(least.best.name, "beside the others, it explains less of the error than what remains of it")
 
 
 def needed(accepted: Sequence[Step]) -> list[Step]:

@@ -22,7 +22,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.search.acceptance_tests import is_certain
+from piezo_hysteresis.discrepancy.search.acceptance_tests import FAR, is_certain
 from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, leaves_room, refits_of_relatives
 from piezo_hysteresis.discrepancy.search.candidates import Candidate, score_model
 from piezo_hysteresis.discrepancy.search.earlier_effects import certain, in_best_laws, needed
@@ -34,6 +34,7 @@ from piezo_hysteresis.effects import (
     CATALOGUE,
     HYSTERESIS,
     Arx,
+    Backlash,
     Creep,
     CreepExponential,
     CreepFractional,
@@ -120,6 +121,17 @@ def test_no_effect_is_named_beside_later_ones_if_its_interval_does_not_exclude_t
     assert kept.accepted and kept.best.name == CREEP.name
     assert DRIFT.name not in kept.best.fit.model
     assert [r.name for r in kept.rejected] == [DRIFT.name]
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_an_effect_that_explains_less_than_a_large_error_that_remains_is_not_named(first):
+    """Beside a slew limit and a saturation in another order, an even polynomial was named and left V at 239 of 222."""
+    drift, hidden = ThermalDrift(D=3e-7, tau=10.0), Backlash(b=0.03)
+    steps = steps_with((CREEP, DRIFT) if first else (DRIFT, CREEP), (drift, hidden))
+    assert steps[-1].best.score.excess > FAR
+    kept = certain(steps)
+    assert [step.best.name for step in kept if step.accepted] == [DRIFT.name]
+    assert [r.name for step in kept for r in step.rejected] == [CREEP.name]
 
 
 def test_a_fit_that_stopped_early_refuses_no_effect():
