@@ -90,13 +90,16 @@ def _bends_dynamics(candidate: Candidate) -> bool:
 def refits_of_relatives(candidates: Sequence[Candidate], best: FittedCandidate, before: Score) -> list[FittedCandidate]:
     """Refits of candidates that are equal to the best one on slow drives, and of its other laws if an error remains.
 
-    Each refit begins with the fitted model of the best one, because the loop is the same.
+    Each refit begins with the fitted model of the best one, because the loop is the same. Another law has to reach the
+    floor: it could absorb a part of a further effect that is missing.
     """
     law = best.effect.public_name() if leaves_room(best.score) else None
-    others = [c for c in candidates if c.name != best.name]
-    related = [c for c in others if c.effect.is_twin_of(best.effect) or c.effect.public_name() == law]
+    twins = [c for c in candidates if c.effect.is_twin_of(best.effect)]
+    laws = [c for c in candidates if c.effect.public_name() == law and c.name != best.name]
     from_best = partial(refit, best.fit.model.without(best.name), max_iterations=LATER)
-    return collected(partial(settled, before=before), collected(from_best, related))
+    found = collected(partial(settled, before=before), collected(from_best, [*twins, *laws]))
+    names = {c.name for c in twins}
+    return [c for c in found if c.name in names or c.score.excess <= ADEQUATE]
 
 
 def _anew(candidate: FittedCandidate) -> FittedCandidate:
