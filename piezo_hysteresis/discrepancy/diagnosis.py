@@ -138,7 +138,7 @@ class Diagnosis(Pictured):
                     "family": effect.family,
                     "predicted_live": effect.is_predicted_live(),
                     "member_certain": step.member_certain,
-                    "explained_fraction": round(self.gap.explained, 4),
+                    "explained_fraction": round(self.gap.explained_by_effects, 4),
                     "parameters": _parameters(self.fit, effect.name),
                     "confusable_with": list(step.confusable_with),
                     "held_out_gain": round(step.before.cost - step.best.score.cost, 4),

@@ -69,6 +69,9 @@ class Gap:
         each record. It differs from `after` only for effects that are not predicted live.
     free_zeros : bool
         Whether the sensor zero was free in every record.
+    refitted : Gap or None
+        The gap from the given model, fitted to these records without the effects, to the extended model. A fit also
+        removes what has changed in the stage, and this is no share of the effects. None without a given model.
     """
 
     before: float
@@ -79,6 +82,7 @@ class Gap:
     unseen: bool
     live: float
     free_zeros: bool = False
+    refitted: Gap | None = None
 
     @property
     def falls(self) -> bool:
@@ -94,6 +98,11 @@ class Gap:
     def explained(self) -> float:
         """Share X of the gap that the extended model explains: 1 − √((V_after − 1)/(V_before − 1)), between 0 and 1."""
         return explained(*self._squares, 1.0)
+
+    @property
+    def explained_by_effects(self) -> float:
+        """The same share of what the model leaves if it is fitted to these records without the effects."""
+        return (self.refitted or self).explained
 
     def stated_by(self, model: Model, experiment: Experiment, everywhere: Gap | None = None) -> Model:
         """The extended model with the experiment as its origin, and with its errors.

@@ -154,6 +154,8 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
             if not falls and gap.after > gap.before:  # a refit that names nothing must not predict worse
                 delivered, fit = given, None
                 gap = gap_between(given, given, setup, tested, offset=True)
+            if falls:
+                gap = replace(gap, refitted=gap_between(first.stated_model, delivered, setup, tested, offset=True))
     if falls:
         said = named_conclusion(selection, gap)
     conclusion, reason = said

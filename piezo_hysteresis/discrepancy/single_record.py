@@ -29,7 +29,7 @@ import numpy as np
 
 from ..blocks.block import Array
 from ..effects import ExtraResonance
-from ..errors import PiezoError
+from ..errors import DivergenceError, PiezoError
 from ..identification.cores import start_helpers
 from ..identification.fit.fit import Fit
 from ..identification.fit.time_limit import TimeSpentError, ending_at
@@ -108,6 +108,9 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     state.progress("gap", 0.9)
     first, final = given or setup.baseline.model, selection.model  # the gap of a given model is that before any refit
     gap = gap_between(first, final, setup, setup.tested, offset=True)
+    if given is not None:
+        with suppress(DivergenceError):
+            gap = replace(gap, refitted=gap_between(setup.baseline.stated_model, final, setup, setup.tested, offset=True))
     shown = {s.best.effect.public_name() for s in selection.accepted}
     missing = missing_excitation(setup.records, setup.usable, shown)
     origin = CHOSEN if start.found else KEPT if fit is None else REFITTED

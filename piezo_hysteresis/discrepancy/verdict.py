@@ -110,7 +110,10 @@ def named_conclusion(selection: Selection, gap: Gap) -> tuple[Conclusion, str]:
         if gap.after <= np.sqrt(ADEQUATE) * gap.floor
         else f"an error of {gap.after / gap.floor:.1f} times the noise floor remains unexplained"
     )
-    said = f"The model does not contain {names}, which {explain} {100 * gap.explained:.0f} % of the gap; {rest}."
+    share = f"{100 * gap.explained_by_effects:.0f} % of the gap"
+    if gap.refitted is not None:
+        share += f" that remains after a fit to these records ({gap.refitted.before:.3g} % of the range)"
+    said = f"The model does not contain {names}, which {explain} {share}; {rest}."
     if (excess := selection.score.excess) > ADEQUATE:
         said += (
             f" The training records keep an error of {np.sqrt(excess):.1f} floors: the law of an effect may differ, "
