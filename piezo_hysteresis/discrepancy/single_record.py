@@ -110,7 +110,8 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     gap = gap_between(first, final, setup, setup.tested, offset=True)
     if given is not None:
         with suppress(DivergenceError):
-            gap = replace(gap, refitted=gap_between(setup.baseline.stated_model, final, setup, setup.tested, offset=True))
+            fitted = gap_between(setup.baseline.stated_model, final, setup, setup.tested, offset=True)
+            gap = replace(gap, refitted=fitted)
     shown = {s.best.effect.public_name() for s in selection.accepted}
     missing = missing_excitation(setup.records, setup.usable, shown)
     origin = CHOSEN if start.found else KEPT if fit is None else REFITTED
