@@ -16,13 +16,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from .history import FleetHistory, ParameterSeries
 from .outliers import FAR
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +40,8 @@ class ChangedStage:
     earlier, later : float
         Medians over the earlier and over the later half of the recordings of the stage.
     distance : float
-        |later − earlier| over the standard error of the difference of two recordings.
+        |later − earlier| over the standard error of the difference of two recordings, which contains how much
+        recordings of one stage differ in this fleet.
     """
 
     stage: str
@@ -60,14 +65,20 @@ def changed_stages(history: FleetHistory) -> tuple[ChangedStage, ...]:
 
 def _changed(history: FleetHistory, name: str, series: ParameterSeries) -> Iterator[ChangedStage]:
     time, owner = history.time[series.index], history.stage[series.index]
-    errors = series.standard_error
-    for stage in np.unique(owner):
-        member = np.flatnonzero((owner == stage) & ~np.isnat(time) & np.isfinite(errors))
-        if member.size < 2:
-            continue
-        before, after = member[: member.size // 2], member[-(member.size // 2) :]
-        earlier, later = (float(np.median(series.value[half])) for half in (before, after))
-        error = float(np.hypot(np.median(errors[before]), np.median(errors[after])))
+    errors, value = series.standard_error, series.value
+    known = ~np.isnat(time) & np.isfinite(errors)
+    members = {str(stage): np.flatnonzero((owner == stage) & known) for stage in np.unique(owner)}
+    halves = {s: (m[: m.size // 2], m[-(m.size // 2) :]) for s, m in members.items() if m.size > 1}
+    spread = _spread([value[half] for both in halves.values() for half in both])
+    for stage, both in halves.items():
+        earlier, later = (float(np.median(value[half])) for half in both)
+        error = float(np.linalg.norm([np.hypot(np.median(errors[half]), spread) for half in both]))
         distance = abs(later - earlier) / error if error > 0.0 else 0.0
         if distance > FAR:
-            yield ChangedStage(str(stage), name, series.unit, earlier, later, distance)
+            yield ChangedStage(stage, name, series.unit, earlier, later, distance)
+
+
+def _spread(halves: Sequence[Array]) -> float:
+    """Standard deviation between the recordings of one half: that of the median half, or 0 if none has several."""
+    squares = [np.var(h, ddof=1) * (h.size - 1) / chi2.median(h.size - 1) for h in halves if h.size > 1]
+    return float(np.sqrt(np.median(squares))) if squares else 0.0

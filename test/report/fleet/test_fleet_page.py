@@ -96,6 +96,19 @@ def test_a_stage_that_changes_is_named_with_its_change():
     assert "One stage has changed over time: s2, the first in bouc_wen.A." in fleet_page(h).html
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_what_differs_from_day_to_day_is_no_change(seed):
+    """The gain of every stage scatters by 0.5 %, and each recording knows it within 0.05 %; one becomes 10 % larger."""
+    h = history()
+    index = h.parameters["bouc_wen.A"].index
+    value = 1.0 + 0.005 * np.random.default_rng(seed).standard_normal(index.size)
+    object.__setattr__(h, "parameters", {"x": ParameterSeries("1", index, value, value - 5e-4, value + 5e-4)})
+    assert changed_stages(h) == ()
+    value = np.where((h.stage == "s2") & (h.time > np.datetime64("2026-03-10")), 1.1 * value, value)
+    object.__setattr__(h, "parameters", {"x": ParameterSeries("1", index, value, value - 5e-4, value + 5e-4)})
+    assert [c.stage for c in changed_stages(h)] == ["s2"]
+
+
 def test_an_interval_that_a_bound_cuts_is_no_reason_for_a_change():
     """Two delays of 0 to 1 ms, both known within 1.1 ms: they differ by less than 1.3 standard errors of 0.56 ms."""
     value = np.where(np.arange(EACH * len(STAGES)) % EACH < EACH // 2, 0.1e-3, 1.1e-3)
