@@ -115,16 +115,20 @@ class Scores:
         `loop_heights` of the model.
     tangent : ChainTangent
         Sensitivities to these parameters before the next sample; `Chain.rest_tangent` if they are unknown.
+    unused : int
+        Number of samples before the first block.
     """
 
-    def __init__(self, chain: Chain, state: ChainState, loop: Mapping[str, float], tangent: ChainTangent) -> None:
+    def __init__(
+        self, chain: Chain, state: ChainState, loop: Mapping[str, float], tangent: ChainTangent, unused: int = 0
+    ) -> None:
         self._chain, self._state, self._tangent = chain, state, tangent
         self._loop, self._weights = tuple(loop), np.array([*loop.values()])
         self._period = chain.setting.sample_period
         self.block_size = block_size(self._period)
         self._decay = float(np.exp(-self._period / SLOW_TIME))
         self._rows: list[Array] = []
-        self._held = 0
+        self._held, self._unused = 0, unused
         self._last: tuple[float, float, float] | None = None  # prediction, slow, voltage
 
     def add(self, voltage: Array, residual: Array, stamp: int) -> list[ChangeScore]:
@@ -153,8 +157,10 @@ class Scores:
         follows = _low_pass(y, self._decay, slow)
         self._last = (float(y[-1]), float(follows[-1]), float(voltage[-1]))
         speed = np.diff(voltage, prepend=before) / self._period
-        self._rows.append(np.vstack((y, loop, lag, follows, np.ones(y.size), residual, voltage, speed)))
-        self._held += y.size
+        new = np.vstack((y, loop, lag, follows, np.ones(y.size), residual, voltage, speed))[:, self._unused :]
+        self._unused = max(0, self._unused - y.size)
+        self._rows.append(new)
+        self._held += new.shape[1]
         done: list[ChangeScore] = []
         while self._held >= self.block_size:
             rows = np.hstack(self._rows)

@@ -31,7 +31,7 @@ from ..sensor_offset import SensorOffset
 from .baseline import Baseline
 from .detector import Change, ChangeDetector
 from .false_alarm_threshold import CLEARED
-from .score import ChangeScore, Scores, loop_heights
+from .score import ChangeScore, Scores, block_size, loop_heights
 
 Array = NDArray[np.float64]
 
@@ -91,6 +91,7 @@ class ChangeWatch:
         self._hash, self._period = "", 0.0
         self._zeroing: tuple[SensorOffset, int] | None = None
         self._scores: Scores | None = None
+        self._last = 0  # stamp of the end of a block of the scores [ns]
         self._detector: ChangeDetector | None = None
         self._wanted = 0.0
         self._taken: list[ChangeScore] = []
@@ -139,14 +140,15 @@ class ChangeWatch:
             self._scores, self.blind = None, "voltages that were not received still influence the prediction"
             return None
         if self._scores is None or answer.model is not self._model:
-            self._follow(answer.model, predictor, float(voltage[-1]))
+            self._follow(answer.model, predictor, float(voltage[-1]), stamp)
             return None
         completed = None
         for score in self._scores.add(voltage, answer.residual, stamp):
+            self._last = score.stamp
             completed = self._score(score) or completed
         return completed
 
-    def _follow(self, model: Model, predictor: Predictor, voltage: float) -> None:
+    def _follow(self, model: Model, predictor: Predictor, voltage: float, stamp: int) -> None:
         chain, state = predictor.chain, predictor.state
         if chain is None or state is None:
             return
@@ -154,7 +156,9 @@ class ChangeWatch:
             self.since, self._wanted = 0, 0.0
         self._model, self._hash, self._period = model, model_hash(model), predictor.sample_period
         loop = loop_heights(model)
-        self._scores = Scores(chain, state, loop, chain.rest_tangent(voltage, loop, state.time))
+        # blocks at another phase of a periodic drive have another misfit than those of the baseline
+        size, since = block_size(self._period), round((stamp - self._last) * 1e-9 / self._period) if self._last else 0
+        self._scores = Scores(chain, state, loop, chain.rest_tangent(voltage, loop, state.time), -since % size)
         self._watch(self.baseline, same_offset=False)
 
     def _watch(self, baseline: Baseline | None, *, same_offset: bool) -> None:
