@@ -156,19 +156,17 @@ class Identification:
 
     @property
     def judged(self) -> tuple[PhaseError, ...]:
-        """Errors of the held-out records, or of the fitted ones if there are none."""
-        return tuple(p for p in self.phases if not p.is_fitted) or self.phases
+        """Errors of the held-out records, or of the fitted ones if there are none; without rests.
+
+        The error of a rest is the noise, so the rests between the drives would hide the error of what moves.
+        """
+        tested = tuple(p for p in self.phases if not p.is_fitted) or self.phases
+        return tuple(p for p in tested if p.is_moving) or tested
 
     @property
     def free_run_error(self) -> float:
-        """RMS free-run error over the tested records, with equal weights [m]."""
+        """RMS free-run error over the tested records in which the drive moves, with equal weights [m]."""
         return float(np.sqrt(np.mean([p.rms**2 for p in self.judged])))
-
-    @property
-    def moving_error(self) -> float:
-        """The same over those in which the drive moves; over all if it moves in none [m]."""
-        moving = [p for p in self.judged if p.is_moving] or self.judged
-        return float(np.sqrt(np.mean([p.rms**2 for p in moving])))
 
     @property
     def free_run_percent(self) -> float:

@@ -211,7 +211,7 @@ def _provenance_of(result: Identification, found: FitOutcome, experiment: Experi
     largest = max(p.rms for p in result.phases)
     origin = {
         **provenance(experiment, result.free_run_error, result.free_run_percent),
-        **record_errors(largest, result.moving_error, unseen),
+        **record_errors(largest, result.free_run_error, unseen),
         **identified_range(found.records, roles.fitted),
     }
     if roles.broadband:

@@ -45,7 +45,7 @@ _ARCHIVE = b"PK\x03\x04"
 """First bytes of an NPZ file."""
 
 _PROVENANCE = {
-    "free_run_error": "m; rms in free run, on data left out where there were any",
+    "free_run_error": "m; rms in free run, on data left out where there were any; of `identify`, without rests",
     "free_run_error_percent": "% of the displacement range",
     "largest_record_error": "m; the largest rms of one record, fitted or left out",
     "moving_record_error": "m; rms in free run over the records in which the drive moves",

@@ -288,3 +288,19 @@ def test_parameters_that_the_drive_does_not_separate_are_not_stated_as_known():
         low, high = found.fit.interval(name)
         assert low < TRUTH.values()[name] < high
     assert [n.severe for n in found.notices if n.kind == "not_identifiable"] == [True]
+
+
+def test_rests_between_the_drives_do_not_lower_the_stated_error():
+    """A rest shows the noise alone; with or without it, the motion is predicted as badly."""
+    time = 1e-3 * np.arange(3000)
+    stage = Model((BoucWen(), Arx(a=(), b=(1.0,), delay=2.0)), 1e-3, 10.0, 1e-5)
+    drive = 4.0 - 4.0 * np.cos(2 * np.pi * time)
+    voltage = np.concatenate((np.zeros(1000), drive, np.zeros(1000), 0.5 * drive, np.zeros(1000)))
+    moved = stage.simulate(Record(voltage, voltage, 1e-3))[0]
+    measured = moved + 2e-7 * np.sin(3.0 * np.pi * voltage) + NOISE * np.random.default_rng(0).standard_normal(9000)
+    parts = Record(voltage, measured, 1e-3).split(1000, 4000, 5000, 8000)
+    found = identify(Experiment(parts))
+    errors = [found.phases[i].rms for i in (1, 3)]
+    assert found.free_run_error == pytest.approx(np.sqrt(np.mean(np.square(errors))))
+    assert found.free_run_error > 1.2 * np.sqrt(np.mean([p.rms**2 for p in found.phases]))
+    assert found.model.provenance["free_run_error"] == found.model.provenance["moving_record_error"]

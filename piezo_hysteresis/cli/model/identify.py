@@ -177,7 +177,8 @@ def _phases(found: Identification) -> Table:
         (p.phase, f"{p.percent:.3f}", f"{1e9 * p.rms:.1f}", "fitted" if p.is_fitted else "not fitted")
         for p in found.phases
     )
-    judged = "the phases that were not fitted" if any(not p.is_fitted for p in found.phases) else "all (fitted) phases"
+    unseen = any(not p.is_fitted for p in found.phases)
+    judged = f"{'the phases that were not fitted' if unseen else 'all (fitted) phases'} in which the drive moves"
     span = 100.0 * found.free_run_error / found.free_run_percent if found.free_run_percent else 0.0
     note = (
         f"The sensor zero is fitted for every phase. The range is {1e6 * span:.4g} µm, peak to peak over the "
