@@ -49,6 +49,8 @@ FEWEST = 64
 """Smallest number of samples in a block."""
 TIE = 1.2
 """Ratio of errors up to which the data do not decide; then plays are used, which stay inside the largest loop."""
+LONGEST = 100
+"""Largest number of linearisations of the joint fit with plays, which leave their bounds one after another."""
 
 
 def with_plays(model: Model, records: Sequence[Record]) -> Model | None:
@@ -122,7 +124,7 @@ def choose_memory(
     )
     kept, kept_floors = records_to_fit(records, floors, fitted)
     free = [*linear_numbers(plays), *(n for n in joint.names if n.startswith(f"{Arx.name}."))]
-    found = fit(plays, kept, free, floors=kept_floors, nuisance=Nuisance(offset=True))
+    found = fit(plays, kept, free, floors=kept_floors, nuisance=Nuisance(offset=True), max_iterations=LONGEST)
     return found, (Notice("memory", f"{message}; {because}, so {MEMORY.name} is used"),)
 
 
