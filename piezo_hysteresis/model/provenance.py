@@ -31,7 +31,7 @@ LARGEST = "largest_record_error"
 
 
 MOVING = "moving_record_error"
-"""Key of the free-run error over the records in which the drive moves. That of other origin may be a mean with rests."""
+"""Key of the free-run error over the records in which the drive moves. `free_run_error` may be a mean with rests."""
 
 
 UNSEEN = "unseen_records"

@@ -38,7 +38,7 @@ def relays(level, count=40):
 
 
 def measured(drive, phase, seed):
-    """Record of a Preisach stage of 15 µm for 0 to 10 V with a mode of 180 Hz, which was driven over its range before."""
+    """Record of a Preisach stage of 15 µm for 0 to 10 V with a mode of 180 Hz, which was driven before."""
     before = np.concatenate((np.linspace(1.0, -1.0, 200), np.linspace(-1.0, drive[0] / 5.0 - 1.0, 200)))
     w = relays(np.concatenate((before, drive / 5.0 - 1.0)))[before.size :]
     omega = 2.0 * np.pi * 180.0
