@@ -114,3 +114,17 @@ def test_the_highest_frequency_of_other_drives_includes_their_harmonics(random):
     for voltage in (triangle(10.0, 2.0, 1e-3), random.standard_normal(20_000)):
         found = content(voltage, 1e-3)
         assert found.highest == found.bandwidth > 30.0
+
+
+def test_a_rest_whose_voltage_was_measured_with_noise_shows_no_dynamics():
+    """The stage has not seen that noise; a commanded noise of the same size it has."""
+    time, rng = 1e-3 * np.arange(4000), np.random.default_rng(0)
+    loops, rest = 60.0 - 90.0 * np.cos(2.0 * np.pi * time), np.full(1000, -30.0)
+    rest[:8] = loops[7::-1]
+    shaken = rest + 0.05 * rng.standard_normal(rest.size)
+
+    def broadband(*drives):
+        return roles_of(Experiment(tuple(Record(u, 1e-8 * u, 1e-3) for u in drives))).broadband
+
+    assert broadband(loops, shaken) == (1,)
+    assert broadband(loops + 0.05 * rng.standard_normal(loops.size), shaken) == ()

@@ -21,7 +21,8 @@ from dataclasses import dataclass
 
 from ...errors import RecordError
 from ...record import CONDITIONING, Experiment
-from .excitation_content import ExcitationContent, excitation_content
+from .excitation_content import MOVES, ExcitationContent, excitation_content
+from .noise import voltage_noise
 
 HELD_OUT = ("validation",)
 """Phases that are not fitted by default."""
@@ -82,6 +83,9 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
     fastest = experiment.fastest_period
     # a triangle has few turning points and straight lines between them
     rich = [i for i in fitted if contents[i].is_broadband and i not in straight]
+    # the stage has not seen the noise of a measured voltage, which is all that a rest contains
+    least = MOVES * largest * (voltage_noise(experiment.records) > 0.0)
+    rich = [i for i in rich if contents[i].span >= least[i]]
     broadband = [i for i in rich if experiment[i].sample_period < 1.001 * fastest]
     return Roles(contents, tuple(fitted), out, tuple(triangles or slow or moving), tuple(broadband))
 
