@@ -29,6 +29,7 @@ from ..picture import Picture, picture_of
 from ..record import Experiment, Notice, Samples
 from .fit.fit import Fit
 from .fit.normal_equations import Nuisance, residuals
+from .records.excitation_content import moving
 from .records.roles import Roles
 from .steps.comparison import InputComparison
 from .steps.delay import Delay
@@ -77,7 +78,7 @@ class PhaseError:
     is_fitted : bool
         False for held-out data.
     is_moving : bool
-        Whether the drive moves.
+        Whether the drive moves noticeably.
     """
 
     phase: str
@@ -99,13 +100,14 @@ def phase_errors(model: Model, experiment: Experiment, roles: Roles) -> tuple[Ph
     """
     errors = residuals(model, experiment.records, Nuisance(offset=True))
     rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
+    moved = moving(roles.contents)
     return tuple(
         PhaseError(
             phase=experiment[i].phase,
             rms=rms[i],
             percent=100.0 * rms[i] / experiment.range,
             is_fitted=i in roles.fitted,
-            is_moving=roles.contents[i].span > 0.0,
+            is_moving=roles.contents[i] in moved,
         )
         for i in (*roles.fitted, *roles.held_out)
     )
