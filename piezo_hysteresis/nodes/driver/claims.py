@@ -57,15 +57,23 @@ class DriverClaims:
         refuse: Callable[[str, int, PiezoError], None],
     ) -> None:
         self._node, self._claim, self._streaming, self._refuse = node, claim, streaming, refuse
-        self._publisher = advertise(node, "claimed_by")
-        self._show()
+        self._publisher, self._has_stage = advertise(node, "claimed_by"), False
         subscribe(node, "claim", self._on_claim)
         node.create_timer(_LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def attach(self) -> None:
+        """Grant claims from now on. A driver without a stage says nothing: another one may have it."""
+        self._has_stage = True
+        self._show()
+
+    def detach(self) -> None:
+        """Grant no more claims."""
+        self._has_stage = False
 
     def _on_claim(self, message: KeyValue) -> None:
         try:
             if message.value == "claim":
-                if self._claim.take(message.key, time.monotonic()):
+                if self._has_stage and self._claim.take(message.key, time.monotonic()):
                     self._node.get_logger().info(f"claimed by {self._claim.owner}")
                     self._show()
             elif message.value == "renew":

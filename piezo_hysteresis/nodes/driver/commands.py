@@ -71,10 +71,12 @@ class DriverCommands:
         """Pass commands to this stage from now on."""
         self._attached = (session, topics)
         self._claim.timeout = session.settings.claim_timeout
+        self._claims.attach()
 
     def detach(self) -> None:
         """Refuse every command from now on."""
         self._attached = None
+        self._claims.detach()
 
     def end(self) -> None:
         """End the services for stopping."""

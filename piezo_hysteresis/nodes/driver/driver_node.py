@@ -40,7 +40,7 @@ from ..runtime.process import run
 from .commands import DriverCommands
 from .diagnostics import DriverDiagnostics
 from .publishers import DriverTopics
-from .second_driver import refuse_second_driver
+from .second_driver import lock_name, refuse_second_driver
 
 _SIMULATED_TIME = "use_sim_time"
 """Parameter of every ROS node: its clock follows /clock."""
@@ -59,14 +59,15 @@ class DriverNode(GuardedNode, LifecycleNode):
 
     Raises
     ------
-    ParameterError
-        Where `use_sim_time` is set.
+    PiezoError
+        Where `use_sim_time` is set, or another process has a driver of this name.
     """
 
     def __init__(self, **options: Any) -> None:
         super().__init__("driver_node", **options)
         if self.get_parameter(_SIMULATED_TIME).value:
             raise ParameterError(f"{_SIMULATED_TIME}: got true, expected false; {_OWN_CLOCK}")
+        self._lock = lock_name(self)
         declare(self, DRIVER)
         for word, back_end in BACK_ENDS.items():
             declare(self, back_end.rows, f"{word}.")
@@ -74,8 +75,7 @@ class DriverNode(GuardedNode, LifecycleNode):
         self._session: DriverSession | None = None
         self._topics: DriverTopics | None = None
         self._failure: PiezoError | None = None
-        self._in_force_changes = False
-        self._latch = StopLatch()
+        self._in_force_changes, self._latch = False, StopLatch()
         self._diagnostics = DriverDiagnostics(self, self._latch)
         self.add_on_set_parameters_callback(self._refuse_while_configured)
         self._commands = DriverCommands(self, self._diagnostics, self._latch, self._latch_changed)

@@ -19,8 +19,12 @@ import sys
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import KeyValue
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
+from std_msgs.msg import String
+
+from piezo_hysteresis.nodes.runtime.qos import LATCHED
 
 pytestmark = pytest.mark.nodes
 
@@ -78,3 +82,33 @@ def test_a_driver_that_plays_from_the_memory_of_its_device_lives(lab, tmp_path):
     assert lab.state("second") == "unconfigured"
     first.signal(signal.SIGINT)
     assert first.wait() == 0
+
+
+def test_a_second_driver_of_the_same_name_ends(lab):
+    """It answered requests for the first one: that there is no stage, and no limits."""
+    lab.driver(**IDEAL)
+    lab.streaming()
+    second = lab.driver(**IDEAL)
+    assert second.wait() == 2
+    assert second.output.count("\n") == 1
+    assert "the name /driver_node in domain" in second.output and "is held by process" in second.output
+    assert lab.state() == "active"
+
+
+def test_a_second_driver_ends_no_claim(lab):
+    """It has no stage and so cannot say who holds it: a running identification ended when it came."""
+    lab.driver(claim_timeout=600.0, **IDEAL)
+    lab.streaming()
+    holders, claims = lab.listen(String, "claimed_by", LATCHED), lab.publisher(KeyValue, "claim")
+    claims.publish(KeyValue(key="bench", value="claim"))
+    lab.wait(lambda: holders and holders[-1].data == "bench", "the claim")
+    second = lab.driver("-r", "__node:=second", **IDEAL)
+    lab.wait(lambda: "is held by process" in second.output, "the refusal")
+    lab.wait(lambda: lab.node.count_publishers("claimed_by") == 2, "the second driver")
+    claims.publish(KeyValue(key="bench", value="release"))
+    lab.wait(lambda: holders[-1].data == "", "the release")
+    claims.publish(KeyValue(key="other", value="claim"))
+    lab.wait(lambda: holders[-1].data == "other", "the next claim")
+    assert lab.state("second") == "unconfigured"
+    shown = [message.data for message in holders]
+    assert shown[shown.index("bench") :] == ["bench", "", "other"]
