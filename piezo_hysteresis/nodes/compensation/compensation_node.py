@@ -56,6 +56,7 @@ class CompensationNode(GuardedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("compensation_node", **options)
+        self.hold_name()
         declare(self, COMPENSATION, read_only=True)
         self._values = read(self, COMPENSATION)
         compile_kernels(self.get_logger().info)
@@ -63,11 +64,10 @@ class CompensationNode(GuardedNode):
         self._driver = DriverClient(self, self._values["driver"])
         self._error, self._rms = advertise(self, "tracking_error"), advertise(self, "tracking_rms")
         self._runs = PathRuns(self._driver, self._status, self._values)
-        self._reader = SampleReader()
         self._model: Model | None = None
         self._applied: AppliedState | None = None
         self._job: Job | None = None
-        self._phase = self._frame = ""
+        self._reader, self._phase, self._frame = SampleReader(), "", ""
         self._set_point = SetPoint(advertise(self, "set_voltage"), self._values["integral_time"])
         if self._values["model_file"]:
             self._follow_model(load(self._values["model_file"]))

@@ -40,7 +40,7 @@ from ..runtime.process import run
 from .commands import DriverCommands
 from .diagnostics import DriverDiagnostics
 from .publishers import DriverTopics
-from .second_driver import lock_name, refuse_second_driver
+from .second_driver import refuse_second_driver
 
 _SIMULATED_TIME = "use_sim_time"
 """Parameter of every ROS node: its clock follows /clock."""
@@ -67,7 +67,7 @@ class DriverNode(GuardedNode, LifecycleNode):
         super().__init__("driver_node", **options)
         if self.get_parameter(_SIMULATED_TIME).value:
             raise ParameterError(f"{_SIMULATED_TIME}: got true, expected false; {_OWN_CLOCK}")
-        self._lock = lock_name(self)
+        self.hold_name()
         declare(self, DRIVER)
         for word, back_end in BACK_ENDS.items():
             declare(self, back_end.rows, f"{word}.")

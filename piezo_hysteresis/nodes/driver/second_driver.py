@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`lock_name` and `refuse_second_driver`: one driver of a name, and one of a namespace."""
+"""`refuse_second_driver`: raises an error where the namespace has a driver already, on this machine or another one."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 
-from ...acquisition.stage_lock import StageLock
 from ...errors import StageError
 from ..runtime.qos import SAMPLES
 from ..topics import DIAGNOSTICS, TOPICS
@@ -35,24 +34,6 @@ _SILENCE = 2.5
 
 _INTERVAL = 0.02
 """Time between two looks [s]."""
-
-
-def lock_name(node: Node) -> StageLock:
-    """Lock the name of a driver on this computer until its process ends.
-
-    Two nodes of one name answer each request in turn, and one of them does not know the stage.
-
-    Parameters
-    ----------
-    node : Node
-        The driver node.
-
-    Raises
-    ------
-    StageError
-        If the driver of another process has this name.
-    """
-    return StageLock([f"the name {node.get_fully_qualified_name()} in domain {node.context.get_domain_id()}"])
 
 
 def refuse_second_driver(node: Node, discovery_time: float) -> None:

@@ -60,6 +60,7 @@ class ModelNode(GuardedNode):
 
     def __init__(self) -> None:
         super().__init__("model_node")
+        self.hold_name()
         declare(self, MODEL)
         self._values = read(self, MODEL)
         compile_kernels(self.get_logger().info)

@@ -27,6 +27,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from ...acquisition.stage_lock import StageLock
 from ...errors import reason_of
 from ..messages.conversions import diagnostic, values_of
 
@@ -64,6 +65,19 @@ class GuardedNode(Node):
     def __init__(self, *arguments: Any, **named: Any) -> None:
         super().__init__(*arguments, **named)
         self.add_on_set_parameters_callback(_refuse_another_clock)
+
+    def hold_name(self) -> None:
+        """Hold the name of this node on this computer until its process ends.
+
+        Of two nodes of one name each carries out the same request, and each sends its own answer.
+
+        Raises
+        ------
+        StageError
+            If a node of another process holds the name.
+        """
+        where = f"domain {self.context.get_domain_id()}"
+        self._name_lock = StageLock([f"the name {self.get_fully_qualified_name()} in {where}"])
 
     @property
     def recent_fault(self) -> str:

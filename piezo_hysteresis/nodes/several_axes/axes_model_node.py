@@ -62,6 +62,7 @@ class AxesModelNode(GuardedNode):
 
     def __init__(self) -> None:
         super().__init__("axes_model_node")
+        self.hold_name()
         declare(self, AXES)
         self._values = read(self, AXES)
         self._streams = [

@@ -84,17 +84,6 @@ def test_a_driver_that_plays_from_the_memory_of_its_device_lives(lab, tmp_path):
     assert first.wait() == 0
 
 
-def test_a_second_driver_of_the_same_name_ends(lab):
-    """It answered requests for the first one: that there is no stage, and no limits."""
-    lab.driver(**IDEAL)
-    lab.streaming()
-    second = lab.driver(**IDEAL)
-    assert second.wait() == 2
-    assert second.output.count("\n") == 1
-    assert "the name /driver_node in domain" in second.output and "is held by process" in second.output
-    assert lab.state() == "active"
-
-
 def test_a_second_driver_ends_no_claim(lab):
     """It has no stage and so cannot say who holds it: a running identification ended when it came."""
     lab.driver(claim_timeout=600.0, **IDEAL)
