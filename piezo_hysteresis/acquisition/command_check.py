@@ -79,7 +79,7 @@ class CommandCheck:
         self._require_drivable()
         low, high = self.limits.voltage_min, self.limits.voltage_max
         if not (math.isfinite(voltage) and low <= voltage <= high):
-            raise StageError(f"got {voltage:g} V, expected {low:g} to {high:g} V; nothing moves")
+            raise StageError(f"got {voltage} V, expected {low:g} to {high:g} V; nothing moves")
         return float(voltage)
 
     def _require_drivable(self) -> None:

@@ -77,6 +77,13 @@ def test_set_points_outside_are_refused(voltage):
         CHECK.set_point(voltage)
 
 
+def test_a_set_point_that_is_a_rounding_error_too_high_is_stated_in_full():
+    """'got 10 V, expected 0 to 10 V' was said of it."""
+    too_high = float(np.nextafter(10.0, 11.0))
+    with pytest.raises(StageError, match=f"got {too_high!r} V, expected 0 to 10 V"):
+        CHECK.set_point(too_high)
+
+
 def test_a_replayed_stage_cannot_be_driven():
     check = CommandCheck(Description("replay", True, 1.0, 1.0, 0.0, 1.0, ignores_drive=True), 1.0, 2.0)
     for ask in (lambda: check.set_point(0.5), lambda: checked(check, cloud([0.0], 1.0))):
