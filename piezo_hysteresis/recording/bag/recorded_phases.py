@@ -23,7 +23,7 @@ import numpy as np
 
 from ...errors import RecordingError
 from ...record import Notice, Record
-from ..checks.split_at_gaps import split_at_gaps
+from ..checks.split_at_gaps import LARGEST, split_at_gaps
 from ..segmentation.decimating_buffer import averaged_notice
 from ..segmentation.phases import labelled
 from ..segmentation.segment import Segment
@@ -63,10 +63,10 @@ def records_of(
     notices: list[Notice] = []
     moving = _MOVED * max(_travel(segment) for segment in segments)
     before: Segment | None = None
-    kept = excited = False
+    kept = excited = unknown = False
     for segment, average in zip(segments, averages, strict=True):
         if segment.first:
-            before, kept, excited = None, False, False
+            before, kept, excited, unknown = None, False, False, False
         slow = segment.averaged(average)
         name = "record" if unlabelled else _name(slow if slow.size else segment, names, notices)
         moves = _travel(segment) > moving
@@ -79,7 +79,7 @@ def records_of(
             )
             notices.append(Notice("moved", text, name))
         if not left_out:
-            begins = segment.phase == 0 if segment.first else segment.lost == 0
+            begins = segment.phase == 0 if segment.first else segment.lost == 0 and not unknown
             if excited and not kept:
                 notices.append(
                     Notice("history", "earlier phases were not recorded; the stage is assumed to have settled", name)
@@ -87,6 +87,11 @@ def records_of(
             if not slow.size:
                 text = f"its {segment.size} samples are fewer than the {average} to be averaged; the phase was left out"
                 notices.append(Notice("averaged", text, name))
+                continue
+            if len(segments) > 1 and not _has_measured(slow):
+                text = f"none of its {segment.size} samples is finite; the phase was left out"
+                notices.append(Notice("non_finite", text, name))
+                unknown = True
                 continue
             if options.average is None and average > 1:
                 notices.append(averaged_notice(average, slow.sample_period, name))
@@ -107,9 +112,11 @@ def records_of(
                 )
             records += parts
             notices += more_notices
-            kept = True
+            kept, unknown = True, False
         excited |= name != IDLE
         before = segment
+    if not records and unknown:
+        raise RecordingError("holds no phase with a finite sample, expected voltages and displacements")
     if not records:
         raise RecordingError(f"holds only {IDLE} and {HOLD}, expected phases; `include` keeps those")
     origin = records[0].start_time
@@ -130,6 +137,12 @@ def _interruptions(segment: Segment, name: str, left_out: bool) -> Iterator[Noti
     if paused := sum(n for at, n in segment.pauses.items() if at):
         held = f"{paused} samples ({paused * segment.sample_period:.3g} s) were not measured"
         yield Notice("pause", f"{held} while the device held its voltage and its memory was read", name)
+
+
+def _has_measured(segment: Segment) -> bool:
+    """Whether drive and displacement are numbers together in any sample."""
+    voltage, displacement = segment.channels["voltage"], segment.channels["displacement"]
+    return bool(((np.abs(voltage) < LARGEST) & (np.abs(displacement) < LARGEST)).any())
 
 
 def _travel(segment: Segment) -> float:

@@ -402,3 +402,34 @@ def test_writing_an_experiment_and_reading_it_is_exact(tmp_path):
         np.testing.assert_array_equal(got.displacement, sent.displacement)
         assert (got.phase, got.sample_period, got.continues) == (sent.phase, sent.sample_period, sent.continues)
         assert got.initial_voltage == sent.initial_voltage
+
+
+def test_a_phase_without_a_number_is_left_out_and_the_others_are_read(tmp_path):
+    """A sensor that was lost for one phase, or one damaged block of another publisher, cost the whole recording."""
+    with BagWriter(tmp_path / "bag") as bag:
+        driver = Driver(bag)
+        driver.phase(0, "idle")
+        driver.play(2, voltage=0.0)
+        for number, name in enumerate(("step", "noise", "triangle"), 1):
+            driver.phase(number, name)
+            for _ in range(3):
+                block = driver.block()
+                if name == "noise":
+                    block.channels["displacement"][:] = np.nan
+                driver.send(block)
+                driver.advance(block)
+    experiment = read(tmp_path / "bag")
+    assert [(r.phase, r.size, r.truncated) for r in experiment] == [
+        ("step", 3 * SIZE, False),
+        ("triangle", 3 * SIZE, True),
+    ]
+    assert [n.phase for n in experiment.notices if "none of its 1500 samples is finite" in n.message] == ["noise"]
+
+
+def test_a_recording_without_a_number_is_refused(tmp_path):
+    with BagWriter(tmp_path / "bag") as bag:
+        driver = Driver(bag)
+        driver.phase(1, "step")
+        driver.send(replace(driver.block(), channels=dict.fromkeys(("voltage", "displacement"), np.full(SIZE, np.nan))))
+    with pytest.raises(PiezoError, match="finite sample"):
+        read(tmp_path / "bag")
