@@ -59,6 +59,7 @@ class GuardedNode(Node):
     """
 
     faults = 0
+    _name_lock: StageLock | None = None
     _newest_fault = ""
     _fault_time = 0.0
 
@@ -67,7 +68,7 @@ class GuardedNode(Node):
         self.add_on_set_parameters_callback(_refuse_another_clock)
 
     def hold_name(self) -> None:
-        """Hold the name of this node on this computer until its process ends.
+        """Hold the name of this node on this computer until it is destroyed or its process ends.
 
         Of two nodes of one name each carries out the same request, and each sends its own answer.
 
@@ -78,6 +79,12 @@ class GuardedNode(Node):
         """
         where = f"domain {self.context.get_domain_id()}"
         self._name_lock = StageLock([f"the name {self.get_fully_qualified_name()} in {where}"])
+
+    def destroy_node(self) -> None:
+        """Destroy the node, and release its name."""
+        super().destroy_node()
+        if self._name_lock is not None:
+            self._name_lock.release()
 
     @property
     def recent_fault(self) -> str:
