@@ -163,6 +163,8 @@ def test_only_a_cold_start_reports_that_kernels_are_compiled(lab):
     warm = lab.start("model_node")
     lab.wait(lambda: "listening on samples" in warm.output, "the model node")
     assert "compiling" not in warm.output
+    warm.signal(signal.SIGINT)
+    warm.wait()
     cold = lab.start("model_node", fresh=True, environment={"NUMBA_CACHE_DIR": str(lab.folder)})
     lab.wait(lambda: "compiling kernels, once; this takes about 30 s" in cold.output, "the line of a cold start")
     cold.signal(signal.SIGKILL)
