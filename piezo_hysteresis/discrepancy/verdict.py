@@ -110,8 +110,8 @@ def named_conclusion(selection: Selection, gap: Gap) -> tuple[Conclusion, str]:
         if gap.after <= np.sqrt(ADEQUATE) * gap.floor
         else f"an error of {gap.after / gap.floor:.1f} times the noise floor remains unexplained"
     )
-    share = f"{100 * gap.explained_by_effects:.0f} % of the gap"
-    if gap.refitted is not None:
+    share, whole = (f"{100 * x:.0f} % of the gap" for x in (gap.explained_by_effects, gap.explained))
+    if gap.refitted is not None and share != whole:
         share += f" that remains after a fit to these records ({gap.refitted.before:.3g} % of the range)"
     said = f"The model does not contain {names}, which {explain} {share}; {rest}."
     if (excess := selection.score.excess) > ADEQUATE:
