@@ -91,6 +91,7 @@ def test_effects_whose_start_values_are_beyond_their_bounds_are_left_out():
     assert diagnose([Record(drive, measured, given.sample_period)], given).verdict is not Verdict.NAMED
 
 
+@pytest.mark.soak
 def test_the_share_of_an_effect_is_not_that_of_a_resonance_that_moved():
     """Plays were said to explain 98 % of the gap, most of which was a resonance 10 % lower than before."""
     noise = 5.0 + np.clip(np.random.default_rng(1).normal(0.0, 1.0, 6000), -4.0, 4.0)
