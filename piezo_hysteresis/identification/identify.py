@@ -38,7 +38,15 @@ from .fit.normal_equations import residuals
 from .identification import INSEPARABLE, Identification, PhaseError, correlated_pairs, phase_errors, undetermined
 from .identified_range import LAG_ERROR, identified_range
 from .inputs import check_gauge, experiment_of
-from .joint_fits import FitInput, FitOutcome, fit_broadband, fit_loops, fit_structured
+from .joint_fits import (
+    AT_THE_FLOOR,
+    FitInput,
+    FitOutcome,
+    fit_broadband,
+    fit_loops,
+    fit_structured,
+    fit_structured_broadband,
+)
 from .one_core import on_one_core
 from .published_steps import delay_of_steps, published_steps
 from .records.conditioning_split import known_from_within
@@ -49,8 +57,6 @@ from .records.roles import HELD_OUT, Roles, roles_of
 from .steps.remaining_lag import lag
 from .steps.three_steps import behind_the_gauge
 
-AT_THE_FLOOR = 1.5
-"""Mean square of residual over floor below which a fit counts as converged, independent of its last step."""
 FEWEST_SAMPLES = 32
 """Number of samples of the shortest record that can show a loop."""
 
@@ -85,8 +91,8 @@ def identify(
     hysteresis : type of HysteresisOperator
         Hysteresis operator; `PublishedBoucWen` for data that were computed by Eq. (7).
     memory : bool
-        Use plays instead of the state of the operator if cross-validation prefers them. Without broadband records the
-        whole structure is chosen in this way, including creep, square, level dependence and mode.
+        Choose the structure by cross-validation: plays or the state of the operator, creep, square, level dependence,
+        and without broadband records a mode. Beside broadband records, the dynamics are ARX.
     held_out : collection of str
         Names of phases that are not fitted; the model is tested on them.
     progress : callable, optional
@@ -138,9 +144,12 @@ def identify(
     frame = Model((hysteresis(), Arx(a=(), b=(gauge.gain,), delay=dead)), period, scale_v, scale_y)
     start = behind_the_gauge(frame, published, records, roles.loops)
     inputs = FitInput(start, records, floors, roles, reach, report)
+    structured = memory and start.hysteresis.memoryless() is not None
     if roles.broadband:
-        found = fit_broadband(inputs, None if delay is None else round(dead), orders, memory)
-    elif memory and start.hysteresis.memoryless() is not None:
+        found = fit_broadband(inputs, None if delay is None else round(dead), orders)
+        if structured:
+            found = fit_structured_broadband(found, inputs, orders, natural, gauge)
+    elif structured:
         found = fit_structured(inputs, natural, gauge)
     else:
         found = fit_loops(inputs)

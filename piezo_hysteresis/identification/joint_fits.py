@@ -19,6 +19,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from ..effects import MEMORY
 from ..errors import counted
 from ..model.model import Model
 from ..record import Notice, Record
@@ -33,12 +36,15 @@ from .records.noise import sensor_noise
 from .records.roles import Roles
 from .steps.comparison import InputComparison, compare_inputs
 from .steps.dynamics import Dynamics, delay_of
-from .steps.hysteresis_choice import choose_memory
 from .steps.linear_start import hysteresis_signals
 from .steps.order_choice import OrderError, choose_order, compare_orders
 from .steps.remaining_lag import lag_notices
-from .structure.structure_choice import StructureChoice, choose_structure
+from .structure.broadband_part import BroadbandPart
+from .structure.left_out import score_left_out
+from .structure.structure_choice import LEADS, TIE, StructureChoice, choose_structure
 
+AT_THE_FLOOR = 1.5
+"""Mean square of residual over floor below which a fit describes the records, independent of its last step."""
 HIGHEST_ORDER = 10
 """Highest model order of the comparison."""
 
@@ -102,8 +108,8 @@ class FitOutcome:
     structure: StructureChoice | None = None
 
 
-def fit_broadband(given: FitInput, delay: int | None, orders: tuple[int, int] | None, memory: bool) -> FitOutcome:
-    """Fit hysteresis and ARX dynamics, which broadband records determine.
+def fit_broadband(given: FitInput, delay: int | None, orders: tuple[int, int] | None) -> FitOutcome:
+    """Fit hysteresis and ARX dynamics, which broadband records determine: the published model.
 
     Parameters
     ----------
@@ -113,8 +119,6 @@ def fit_broadband(given: FitInput, delay: int | None, orders: tuple[int, int] | 
         Delay in the response to a step, samples; None takes it from the dynamics.
     orders : (int, int) or None
         na and nb; None chooses them.
-    memory : bool
-        Whether plays are compared with the state of the operator.
     """
     start, records, floors, roles = given.start, given.records, given.floors, given.roles
     given.report("step 2: dynamics", 0.2)
@@ -125,7 +129,7 @@ def fit_broadband(given: FitInput, delay: int | None, orders: tuple[int, int] | 
 
     def fit_behind(model: Model, samples: int) -> tuple[Fit, Dynamics, tuple[Notice, ...]]:
         def report(word: str, part: float) -> None:
-            given.report(word, 0.3 + 0.6 * part)
+            given.report(word, 0.3 + 0.2 * part)
 
         return fit_dynamics(model, records, floors, roles.fitted, roles.broadband, samples, chosen, report)
 
@@ -145,12 +149,58 @@ def fit_broadband(given: FitInput, delay: int | None, orders: tuple[int, int] | 
     noise = [i for i in roles.broadband if records[i].is_named("noise")]
     comparisons, of_inputs = compare_inputs(fit.model, corrected, noise, samples, chosen)
     notices += [*of_dynamics, *of_averages, *of_inputs]
-    if memory:
-        given.report("memory of the hysteresis", 0.9)
-        fit, of_memory = choose_memory(fit, corrected, floors, roles.fitted, roles.loops)
-        notices += of_memory
     fit = _with_form(fit, (corrected, floors, roles.fitted), given.reach)
     return FitOutcome(fit, corrected, tuple(notices), dynamics, table, comparisons)
+
+
+def fit_structured_broadband(
+    published: FitOutcome, given: FitInput, orders: tuple[int, int] | None, natural: Gauge, gauge: Gauge
+) -> FitOutcome:
+    """Choose the structure beside broadband records, unless the published model describes or predicts them as well.
+
+    Parameters
+    ----------
+    published : FitOutcome
+        Fit of hysteresis and ARX dynamics alone.
+    given : FitInput
+        Start, records and floors.
+    orders : (int, int) or None
+        Highest na and nb; None takes them from the comparison of orders.
+    natural, gauge : Gauge
+        Natural gauge of the records, in which the structure is chosen, and that of the result.
+
+    Raises
+    ------
+    ParameterError
+        If G(1) of the gauge has the wrong sign for plays.
+    """
+    gauge.require_sign(natural)
+    if published.fit.cost <= AT_THE_FLOOR:
+        return published
+    records, fitted = published.records, given.roles.fitted
+    quiet = _quiet(records, given.reach)
+
+    def report(word: str, part: float) -> None:
+        given.report(word, 0.5 + 0.4 * part)
+
+    start = natural.of_model(published.fit.model)
+    highest = orders or (choose_order(published.orders),) * 2
+    dynamics = BroadbandPart(start, records, given.roles.broadband, highest)
+    choice = choose_structure(start, records, quiet, fitted, report, dynamics.fit)
+    alone, whole = (score_left_out(m, records, quiet, fitted) for m in (start, choice.fit.model))
+    errors = f"{np.exp(0.5 * alone):.3g} and {np.exp(0.5 * whole):.3g} times the noise floor"
+    said = f"prediction errors of hysteresis with ARX dynamics alone, and of the structure chosen, are {errors}"
+    margin = LEADS if MEMORY.name in choice.fit.model else -TIE
+    if not whole < alone + margin:
+        return replace(published, notices=(*published.notices, Notice("structure", f"{said}, so they are used alone")))
+    fit = gauge.of_fit(choice.fit)
+    notices = (*published.notices, *choice.notices, Notice("structure", said))
+    return replace(published, fit=fit, notices=notices, structure=replace(choice, fit=fit))
+
+
+def _quiet(records: Sequence[Record], reach: float) -> list[float]:
+    """Floors of the records from the noise of the sensor alone [m]."""
+    return [max(noise, ADEQUACY * reach) for noise in sensor_noise(records)]
 
 
 def fit_structured(given: FitInput, natural: Gauge, gauge: Gauge) -> FitOutcome:
@@ -175,7 +225,7 @@ def fit_structured(given: FitInput, natural: Gauge, gauge: Gauge) -> FitOutcome:
         given.report("joint fit", 0.2)
         rough = fit_lag(start, *steps_apart(records, given.floors, roles.fitted))
         records, notices = without_intersample_error(rough.model, records, given.floors, roles.fitted)
-    quiet = [max(noise, ADEQUACY * given.reach) for noise in sensor_noise(records)]
+    quiet = _quiet(records, given.reach)
 
     def report(word: str, part: float) -> None:
         given.report(word, 0.2 + 0.7 * part)

@@ -64,7 +64,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--no-memory",
         action="store_true",
-        help=f"keep the hysteresis operator even if play operators ({MEMORY.name}) predict better",
+        help="keep hysteresis and dynamics alone even if another structure predicts better",
     )
     parser.add_argument(
         "--held-out",

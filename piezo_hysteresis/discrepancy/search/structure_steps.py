@@ -29,6 +29,7 @@ from ...identification.fit.fit import Fit
 from ...identification.identification import Identification
 from ...identification.steps.remaining_lag import AMPLIFIERS
 from ...identification.structure.left_out import score_left_out
+from ...identification.structure.piece_fit import DELAY
 from ...identification.structure.pieces import pieces_of
 from ...identification.structure.pole_place import with_pole_behind
 from ...identification.structure.structure_choice import LEADS
@@ -72,9 +73,11 @@ def structure_steps(
     score of the published model; `floors` [m] belongs to `records`, and the indices `fitted` count in them.
     """
 
+    held = [n for n in (DELAY,) if n not in found.fit.names]
+
     def refitted(model: Model) -> Fit:
         pieces = pieces_of(records, fitted)
-        by_pieces = fit_structure(model, pieces, floors, max_iterations=FEW)
+        by_pieces = fit_structure(model, pieces, floors, held, FEW)
         return as_fit(by_pieces, pieces, floors, np.zeros((len(by_pieces.names),) * 2))
 
     def candidate(name: str, fit: Fit) -> FittedCandidate:

@@ -64,6 +64,19 @@ def bounded_step(hessian: Array, slope: Array, lower: Array, upper: Array) -> Ar
     return np.asarray(scale * found.x)
 
 
+def projected(directions: Array, total: Array) -> tuple[Array, Array]:
+    """H and s in some directions (q, d), from normal equations (q + 1, q + 1) whose last row and column are s.
+
+    Beside slow poles, what the sums that keep G(1) leave of a curvature can be less than their rounding errors, even
+    negative. H and s of such a direction are 0.
+    """
+    hessian, slope = directions.T @ total[:-1, :-1] @ directions, directions.T @ total[:-1, -1]
+    sums = np.einsum("kd,kl,ld->d", *map(np.abs, (directions, total[:-1, :-1], directions)), optimize=True)
+    lost = np.diag(hessian) <= np.finfo(float).eps * sums
+    hessian[lost], hessian[:, lost], slope[lost] = 0.0, 0.0, 0.0
+    return hessian, slope
+
+
 def bounds_of(model: Model, names: Sequence[str]) -> tuple[Array, Array]:
     """Lower and upper bounds of parameters of a model."""
     rows = [model.row(n) for n in names]

@@ -163,15 +163,15 @@ def fit_dynamics(
     """
     slowest = SLOWEST_POLE * max(records[i].duration for i in fitted)
     tried: list[tuple[Fit, Dynamics]] = []
-    for order in _ladder(orders):
+    for order in ladder(orders):
         start, dynamics = _start(model, records, floors, broadband, delay, order)
         joint = fit_joint(start, records, floors, fitted, progress)
         tried.append((joint, dynamics))
-        if joint.converged and _slowest(joint.model) < slowest:
+        if joint.converged and slowest_time(joint.model) < slowest:
             break
     else:
         joint, dynamics = min(tried, key=lambda outcome: outcome[0].cost)
-    closer = [t for t in tried if _slowest(t[0].model) < slowest and t[0].cost < MUCH_CLOSER * joint.cost]
+    closer = [t for t in tried if slowest_time(t[0].model) < slowest and t[0].cost < MUCH_CLOSER * joint.cost]
     joint, dynamics = min(closer, key=lambda outcome: outcome[0].cost, default=(joint, dynamics))
     used = dynamics_of(joint.model)
     reached = used.array("a").size, used.array("b").size
@@ -185,11 +185,12 @@ def fit_dynamics(
     return joint, dynamics, notices
 
 
-def _ladder(orders: tuple[int, int]) -> list[tuple[int, int]]:
+def ladder(orders: tuple[int, int]) -> list[tuple[int, int]]:
+    """The orders to try, from the highest one to the lowest."""
     return [orders, *((n, n) for n in (6, 4, 3, 2, 1) if n < min(orders))]
 
 
-def _slowest(model: Model) -> float:
+def slowest_time(model: Model) -> float:
     """Longest time constant of the dynamics [s]."""
     return -model.sample_period / float(np.log(max(dynamics_of(model).pole_radius, 1e-300)))
 

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The structure of a model without broadband records: the effects it needs to predict other rates and amplitudes."""
+"""The structure of a model: the effects that it needs to predict other rates and amplitudes."""

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from ...effects import Arx
 from ...model.model import Model
 from ...record import Record
 from .piece_fit import PieceFit, linearised
@@ -51,7 +50,7 @@ def score_left_out(
     adjusts : bool
         Whether the parameters are refitted to the remaining data; False for a model from other data.
     """
-    names = [n for n in free_numbers(model) if not _is_of_high_order(model, n)] if adjusts else []
+    names = free_numbers(model) if adjusts else []
     pieces = pieces_of(records, fitted)
     matrices, weights = linearised(model, pieces, floors, names)
     return next(judge(PieceFit(model, tuple(names), matrices, weights), pieces, (WHOLE,))).score
@@ -62,8 +61,3 @@ def has_several_drives(records: Sequence[Record], fitted: Collection[int]) -> bo
     pieces = pieces_of(records, fitted)
     loops = [p for p in pieces if p.kind is Kind.LOOP and p.record.size > SEEN * records[p.origin].size]
     return len({p.rate for p in loops}) > 1 or len({p.amplitude for p in loops}) > 1
-
-
-def _is_of_high_order(model: Model, name: str) -> bool:
-    """Coefficients of dynamics with more than one pole. They are not fitted: only broadband records determine them."""
-    return name.startswith(f"{Arx.name}.") and len(model[Arx.name].values["a"]) > 1  # type: ignore[arg-type]

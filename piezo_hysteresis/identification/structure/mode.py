@@ -94,8 +94,8 @@ def _silent(plain: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[flo
 
 
 def held_by(fit: PieceFit) -> tuple[str, ...]:
-    """Parameters of a mode that a fit does not adjust."""
-    return tuple(n for n in (*SHAPE, SHARE) if n in fit.model.values() and n not in fit.names)
+    """Parameters of a mode, and the delay, that a fit does not adjust."""
+    return tuple(n for n in (*SHAPE, SHARE, DELAY) if n in fit.model.values() and n not in fit.names)
 
 
 def mode_is_inferred(model: Model) -> bool:

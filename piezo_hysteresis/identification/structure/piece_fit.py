@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from ...effects import Arx
 from ...errors import DivergenceError, ParameterError
 from ...model.model import Model
-from ..fit.bounded_step import bounded_step, bounds_of, gauge
+from ..fit.bounded_step import bounded_step, bounds_of, gauge, projected
 from ..fit.normal_equations import grams
 from ..fit.time_limit import check_time
 from .pieces import WEIGHTS, RecordPiece
@@ -242,14 +242,13 @@ def _cost(model: Model, names: Sequence[str], products: Products) -> float:
 def best_step(now: PieceFit, total: Array, damping: float = 0.0) -> Array:
     """Least-squares change of parameters and zeros for `total`, a sum of matrices of pieces."""
     directions = free_directions(now)
-    hessian = directions.T @ total[:-1, :-1] @ directions
+    hessian, slope = projected(directions, total)
     diagonal = np.maximum(np.diag(hessian), 1e-30)
     # zeros and waves are linear and start at 0: held there by damping, they would turn the step of all other numbers
     damped = np.any(directions[: len(now.names)] != 0.0, axis=0)
     hessian = hessian + np.diag((damping * damped + STIFF) * diagonal)
     low, high = now.box()
     own = (directions == 1.0).argmax(axis=0)  # the parameter of the direction; G(1) is kept by others
-    slope = directions.T @ total[:-1, -1]
     return np.asarray(directions @ bounded_step(hessian, slope, low[own] - 1e-300, high[own] + 1e-300))
 
 

@@ -21,7 +21,7 @@ other rates and amplitudes worse, and its lag is off by up to a tenth of the tim
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,6 +97,10 @@ class LinearPart:
             said = f"the steps come {later} than all other motion, as if the drive did not jump at a sample"
             found.append(Notice("step_time", f"{said}; the lag is that of the other motion"))
         return found
+
+
+FitLinearPart = Callable[[Model, Sequence[RecordPiece], Sequence[float]], LinearPart]
+"""Fits the linear part of a model that has all other effects to pieces with floors [m]."""
 
 
 def in_every_place(found: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> list[PieceFit]:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects import MEMORY, Arx, Creep, CreepTwoRates, EvenInputPolynomial
+from ...model.model import Model
 from ..fit.bounded_step import bounded_step
 from ..steps.linear_start import dynamics_of
 from .piece_fit import GAIN, STIFF, PieceFit
@@ -177,6 +178,7 @@ def _space(full: PieceFit, structure: ModelStructure) -> tuple[Array, Array, Arr
     for k, name in enumerate(full.names):
         if structure.is_held(name):
             fixed[k] = -values[name]
+        if structure.is_held(name) or _is_of_high_order(full.model, name):
             kept.remove(k)
     if structure.creep_rates == 1 and FAST in full.names:
         fast, slow = full.names.index(FAST), full.names.index(SLOW)
@@ -218,3 +220,8 @@ def _logs(full: PieceFit, step: Array, mask: Mask, zero_free: bool) -> float:
         square = matrix[-1, -1] - 2.0 * step @ matrix[:-1, -1] + step @ matrix[:-1, :-1] @ step
         logs.append(np.log(max(1.0, float(square))))
     return float(np.mean(logs))
+
+
+def _is_of_high_order(model: Model, name: str) -> bool:
+    """Coefficients of dynamics with more than one pole. They are not adjusted: few records determine them."""
+    return name.startswith(f"{Arx.name}.") and dynamics_of(model).array("a").size > 1

@@ -45,6 +45,7 @@ from .linear_part import fit_linear_part
 from .mode import held_by
 from .piece_fit import PieceFit
 from .pieces import Kind, RecordPiece, pieces_of
+from .pole_place import FitLinearPart
 from .scores import STRUCTURES, Judged, ModelStructure, judge
 from .step_weights import discounted_steps
 from .structure_fit import fit_structure
@@ -96,7 +97,12 @@ class StructureChoice:
 
 
 def choose_structure(
-    start: Model, records: Sequence[Record], floors: Sequence[float], fitted: Collection[int], progress: Progress
+    start: Model,
+    records: Sequence[Record],
+    floors: Sequence[float],
+    fitted: Collection[int],
+    progress: Progress,
+    fit_linear: FitLinearPart = fit_linear_part,
 ) -> StructureChoice:
     """Choose the structure of the model, and fit it.
 
@@ -112,12 +118,14 @@ def choose_structure(
         Indices of the records to fit.
     progress : callable
         Called with the name of the step and the fraction done.
+    fit_linear : callable
+        Fits the linear part; by default the one that loops and steps determine.
     """
     kept = with_conditioning(records, fitted)
     used, sizes = [records[i] for i in kept], [floors[i] for i in kept]
     pieces = pieces_of(used, [k for k, i in enumerate(kept) if i in fitted])
     progress("structure: lag", 0.1)
-    linear = fit_linear_part(_with_plays(start, used), pieces, sizes)
+    linear = fit_linear(_with_plays(start, used), pieces, sizes)
     full = linear.fit
     progress("structure: effects", 0.4)
     held = held_by(full)
