@@ -19,7 +19,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ...effects import HYSTERESIS, MEMORY, OPERATORS, PublishedBoucWen
+from ...effects import HYSTERESIS, OPERATORS, PublishedBoucWen
 from ...errors import ParameterError
 from ...identification.identification import Identification, undetermined
 from ...identification.identify import identify

@@ -72,7 +72,6 @@ def structure_steps(
     A level dependence of plays is certain only if the plays are: the operator may need no such term. `before` is the
     score of the published model; `floors` [m] belongs to `records`, and the indices `fitted` count in them.
     """
-
     held = [n for n in (DELAY,) if n not in found.fit.names]
 
     def refitted(model: Model) -> Fit:
