@@ -25,7 +25,7 @@ from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Notice
 from piezo_hysteresis.report.figures.comparison import compare
-from piezo_hysteresis.report.page import page
+from piezo_hysteresis.report.page import SECTIONS, page
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
@@ -109,9 +109,10 @@ def drawn(comparison):
 
 
 @pytest.fixture(scope="session")
-def figures(drawn):
-    """The figures of the page by name."""
-    return {drawing.name: drawing for drawing in drawn.drawings}
+def figures(comparison):
+    """The figures of the page by name, without their picture, which takes most of the time of a page."""
+    drawings = [draw(comparison) for section in SECTIONS.values() for draw in section]
+    return {drawing.name: drawing for drawing in drawings if drawing is not None}
 
 
 @pytest.fixture(scope="session")

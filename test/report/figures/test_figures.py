@@ -49,9 +49,9 @@ def linear(period: float, gain: float = 1e-5) -> Model:
     return Model((BoucWen(A=0.0, p1=0.0, p2=1.0), Arx(b=[1.0])), period, 1.0, gain)
 
 
-def test_figures_owe_their_reader_words_and_numbers(drawn):
-    assert len(drawn.drawings) == len(FIGURES)
-    for drawing in drawn.drawings:
+def test_figures_owe_their_reader_words_and_numbers(figures):
+    assert len(figures) == len(FIGURES)
+    for drawing in figures.values():
         assert len(drawing.alternative) > 40
         assert any(c.isdigit() for c in drawing.alternative)
         assert "nan" not in drawing.alternative
