@@ -67,7 +67,7 @@ def test_the_saved_model_predicts_a_rate_left_out_as_well_as_the_best_model(freq
 
 @pytest.mark.parametrize("place", ["filter_drive", "filter_pole"])
 def test_a_pole_before_the_hysteresis_is_named_and_one_behind_it_is_part_of_the_dynamics(place):
-    found = diagnose(played(replace(STAGE, pole=2e-5, **{place: 1e-3}), (1.0, 60.0)))
+    found = diagnose(played(replace(STAGE, pole=2e-5, **{place: 1e-3}), (3.0, 60.0)))
     rows = [row for row in found.effects() if row["name"] == "amplifier_bandwidth"]
     assert len(rows) == (place == "filter_drive")
     for row in rows:
@@ -97,7 +97,7 @@ def test_a_truncated_record_is_diagnosed_after_its_first_full_loop():
     assert found.gap.after < 0.2
 
 
-def sines(*frequencies: float, samples: int = 6000, hidden: Effect | None = None) -> list[Record]:
+def sines(*frequencies: float, samples: int = 4000, hidden: Effect | None = None) -> list[Record]:
     """Sines without a step, of a stage of the published form and one more effect."""
     chain = (BoucWen(), Arx(a=(-0.5,), b=(0.5,), delay=1.0), *([] if hidden is None else [hidden]))
     stage, rng = Model(chain, SLOW_PERIOD, 10.0, 1e-5), np.random.default_rng(0)

@@ -92,14 +92,14 @@ def test_nothing_missing_is_answered_when_no_slow_effect_can_show():
 def test_effects_that_no_drive_within_the_limits_separates_are_undecidable():
     """Slow drives make softening and a sensor nonlinearity the same, and the slew limit allows no others."""
     slow = DriveLimits(PERIOD, voltage_max=8.0, max_slew_rate=150.0)
-    states = driven({"sensor.quadratic": 0.08}, slow, longest=60.0, effects=FEW)
+    states = driven({"sensor.quadratic": 0.08}, slow, longest=40.0, effects=FEW)
     holds_its_promises(states)
     last = states[-1]
     assert last.end is End.UNDECIDABLE
     assert {*last.separation.rivals} == {"sensor_nonlinearity", "softening"}
     assert last.separation.expected_z < last.separation.needed_z
     assert last.answer()["undecidable"]["needed_z"] == last.separation.needed_z
-    assert "No decision is possible within the limits and 60 s" in last.reason()
+    assert "No decision is possible within the limits and 40 s" in last.reason()
     (effect,) = last.found.effects()
     assert {effect["name"], *effect["confusable_with"]} == {*last.separation.rivals}
 
