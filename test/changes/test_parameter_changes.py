@@ -311,7 +311,7 @@ def test_a_higher_loop_beside_the_same_spring_is_a_loop_height(model, another_da
     assert low < higher - 1.0 < high
 
 
-@pytest.mark.parametrize("samples", [0.6, 5.0])
+@pytest.mark.parametrize("samples", [0.6, pytest.param(5.0, marks=pytest.mark.soak)])
 def test_a_gain_that_has_changed_beside_a_delay_is_stated(model, samples):
     change = change_of(model, replace(STAGE, noise_seed=1, gain=1.03, filter_delay=samples * PERIOD))
     value, low, high = change.also["gain"]

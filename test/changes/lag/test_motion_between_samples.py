@@ -42,7 +42,7 @@ def change_of(model, stage):
 MODES = [
     pytest.param((783.0, 6e-4), marks=pytest.mark.soak),
     pytest.param((1310.0, 6e-4), marks=pytest.mark.soak),
-    (2747.0, 2e-5),
+    pytest.param((2747.0, 2e-5), marks=pytest.mark.soak),
     (2747.0, 6e-4),
 ]
 """Frequencies [Hz] and delays [s]."""
