@@ -36,7 +36,7 @@ from .records.noise import sensor_noise
 from .records.roles import Roles
 from .steps.comparison import InputComparison, compare_inputs
 from .steps.dynamics import Dynamics, delay_of
-from .steps.linear_start import hysteresis_signals
+from .steps.linear_start import form_of, hysteresis_signals
 from .steps.order_choice import OrderError, choose_order, compare_orders
 from .steps.remaining_lag import lag_notices
 from .structure.broadband_part import BroadbandPart
@@ -174,9 +174,9 @@ def fit_structured_broadband(
     ParameterError
         If G(1) of the gauge has the wrong sign for plays.
     """
-    gauge.require_sign(natural)
     if published.fit.cost <= AT_THE_FLOOR:
         return published
+    gauge.require_sign(natural)
     records, fitted = published.records, given.roles.fitted
     quiet = _quiet(records, given.reach)
 
@@ -193,8 +193,12 @@ def fit_structured_broadband(
     margin = LEADS if MEMORY.name in choice.fit.model else -TIE
     if not whole < alone + margin:
         return replace(published, notices=(*published.notices, Notice("structure", f"{said}, so they are used alone")))
-    fit = gauge.of_fit(choice.fit)
-    notices = (*published.notices, *choice.notices, Notice("structure", said))
+    if not whole < alone:
+        said += "; plays are preferred up to a small difference, because they stay inside the largest measured loop"
+    fit, notices = gauge.of_fit(choice.fit), published.notices
+    if form_of(fit.model)[2] != form_of(start)[2]:
+        notices = tuple(n for n in notices if n.kind != "order_reduced")
+    notices = (*notices, *choice.notices, Notice("structure", said))
     return replace(published, fit=fit, notices=notices, structure=replace(choice, fit=fit))
 
 
