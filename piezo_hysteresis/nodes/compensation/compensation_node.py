@@ -24,13 +24,11 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import PointCloud2
-from std_msgs.msg import Float64, String
+from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from ...compensation import Limits
 from ...errors import ModelError, PiezoError, StageError, reason_of
-from ...model.model import Model
-from ...model.model_file import load, loads
 from ...online.warmup import compile_kernels
 from ..identification.driver_client import DriverClient
 from ..messages.conversions import phase_text_of, values_of
@@ -42,7 +40,8 @@ from ..runtime.parameters import declare, read
 from ..runtime.process import run
 from ..runtime.sending import send
 from ..topics import advertise, subscribe
-from .applied_state import AppliedState, check_period
+from .applied_state import AppliedState
+from .followed_model import FollowedModel
 from .job import TICK, Job
 from .path_runs import PathError, PathRuns
 from .set_point import SetPoint, volts_per_metre
@@ -62,16 +61,15 @@ class CompensationNode(GuardedNode):
         compile_kernels(self.get_logger().info)
         self._status = CompensationStatus(self)
         self._driver = DriverClient(self, self._values["driver"])
-        self._error, self._rms = advertise(self, "tracking_error"), advertise(self, "tracking_rms")
+        self._error = advertise(self, "tracking_error")
+        self._rms = advertise(self, "tracking_rms")
         self._runs = PathRuns(self._driver, self._status, self._values)
-        self._model: Model | None = None
-        self._applied: AppliedState | None = None
         self._job: Job | None = None
-        self._reader, self._phase, self._frame = SampleReader(), "", ""
+        self._phase = ""
+        self._frame = ""
+        self._reader = SampleReader()
         self._set_point = SetPoint(advertise(self, "set_voltage"), self._values["integral_time"])
-        if self._values["model_file"]:
-            self._follow_model(load(self._values["model_file"]))
-        subscribe(self, "model", self._on_model)
+        self._model = FollowedModel(self, self._values["model_file"], self._status, lambda: self._job is not None)
         subscribe(self, "samples", self._on_samples, deep=True, raw=True)
         subscribe(self, "trajectory", self._on_trajectory)
         subscribe(self, "set_displacement", lambda message: self._move_to(message.data))
@@ -91,31 +89,11 @@ class CompensationNode(GuardedNode):
         if asked is not None:
             self.executor.spin_until_future_complete(asked, timeout_sec=2.0)
 
-    def _on_model(self, message: String) -> None:
-        try:
-            self._follow_model(loads(message.data, "topic 'model'"))
-        except PiezoError as error:
-            self._status.refuse("model", str(error))
-
-    def _follow_model(self, model: Model) -> None:
-        """Use this model from the next trajectory on. The present one ends with the model with which it was planned."""
-        if self._applied is not None:
-            check_period(model, self._applied.sample_period)
-            if self._job is None:
-                self._applied.follow(model)
-        self._model = model
-
     def _on_samples(self, message: bytes) -> None:
-        driver = self._driver.limits
         try:
             block = self._reader.read(message)
             self._frame = block.frame
-            if driver is not None and (self._applied is None or self._applied.sample_period != driver.sample_period):
-                self._applied = AppliedState(driver.sample_period)
-                if self._model is not None:
-                    self._applied.follow(self._model)
-            if self._applied is not None:
-                self._applied.take(block)
+            self._model.take(block, self._driver.limits)
             if self._runs.tracking is not None:
                 self._runs.tracking.take(block)
         except PiezoError as error:
@@ -133,7 +111,8 @@ class CompensationNode(GuardedNode):
             self._status.refuse(name[:64], str(error))
             return Trigger.Response(message=str(error))
         self._set_point.leave()
-        self._phase, self._job = name, self._runs.follow(name, applied, wanted, limits)
+        self._phase = name
+        self._job = self._runs.follow(name, applied, wanted, limits)
         return Trigger.Response(success=True)
 
     def _on_goal(self, goal: Any) -> Trigger.Response:
@@ -155,7 +134,8 @@ class CompensationNode(GuardedNode):
         except PiezoError as error:
             self._status.refuse("set_displacement", str(error))
             return
-        voltage, slope = float(found.voltage[-1]), volts_per_metre(applied.model, limits)
+        voltage = float(found.voltage[-1])
+        slope = volts_per_metre(applied.model, limits)
         self._set_point.go(target, voltage, slope, limits, in_motion=not applied.is_held)
         self._status.show("set", f"{1e6 * target:.6g} µm by {voltage:.6g} V{doubt(found)}", "set_displacement")
 
@@ -176,13 +156,9 @@ class CompensationNode(GuardedNode):
             raise StageError(f"no driver: waiting for {self._driver.missing}")
         if self._driver.blocked:
             raise StageError(self._driver.blocked)
-        if self._applied is None:
-            raise StageError("no samples yet; is the driver active?")
-        if self._model is None:
-            raise ModelError("no model yet; expected model_file, or a model on the topic 'model'")
-        check_period(self._model, driver.sample_period)
+        applied = self._model.ready(driver)
         slew = driver.max_slew_rate * (1.0 - 1e-9)  # rounding must not cause a step that the driver refuses
-        return self._applied, Limits(driver.voltage_min, driver.voltage_max, slew)
+        return applied, Limits(driver.voltage_min, driver.voltage_max, slew)
 
     def _tick(self) -> None:
         tracking = self._runs.tracking
@@ -190,7 +166,8 @@ class CompensationNode(GuardedNode):
             send(self._error, Float64(data=error))
             send(self._rms, Float64(data=tracking.rms or 0.0))
         self._set_point.hold(TICK, self._driver, self._status.lost)
-        if self._applied is not None and (target := self._set_point.to_plan_again(self._applied.is_held)) is not None:
+        applied = self._model.applied
+        if applied is not None and (target := self._set_point.to_plan_again(applied.is_held)) is not None:
             self._move_to(target)
         if self._job is None:
             return
@@ -207,12 +184,9 @@ class CompensationNode(GuardedNode):
                 raise
 
     def _finish(self) -> None:
-        self._job, self._runs.tracking = None, None
-        if self._applied is not None and self._model is not None:
-            try:
-                self._applied.follow(self._model)
-            except ModelError as error:
-                self._status.refuse("model", str(error))
+        self._job = None
+        self._runs.tracking = None
+        self._model.catch_up()
 
     def _give_up(self) -> None:
         if self._job is not None:
@@ -224,7 +198,8 @@ class CompensationNode(GuardedNode):
             response.message = "no trajectory yet: publish one on 'trajectory' (with play: false nothing moves)"
             return response
         name, found = self._runs.last
-        response.success, response.message = found.reachability.is_whole, f"{name}: {described(found)}"
+        response.success = found.reachability.is_whole
+        response.message = f"{name}: {described(found)}"
         return response
 
     def _on_learn(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -239,19 +214,23 @@ class CompensationNode(GuardedNode):
             response.message = str(error)
             return response
         self._set_point.leave()
-        self._phase, self._job = name, self._runs.rounds(name, applied, found, limits)
-        response.success, response.message = True, f"{1 + self._values['learning_rounds']} rounds of '{name}' at most"
+        self._phase = name
+        self._job = self._runs.rounds(name, applied, found, limits)
+        response.success = True
+        response.message = f"{1 + self._values['learning_rounds']} rounds of '{name}' at most"
         return response
 
     def _on_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         held = "set_displacement" if self._set_point.is_holding else ""
-        ended, asked = held if self._job is None else self._phase, self._driver.stop()
+        ended = held if self._job is None else self._phase
+        asked = self._driver.stop()
         self._set_point.leave()
         if self._job is not None:
             self._give_up()
         effect = "the driver goes to its safe voltage" if asked else "there is no driver to stop"
         self._status.show("stopped", f"on request; {effect}", ended)
-        response.success, response.message = asked is not None, f"stopped; {effect}" if asked else effect
+        response.success = asked is not None
+        response.message = f"stopped; {effect}" if asked else effect
         return response
 
 
