@@ -17,36 +17,29 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.parameter import Parameter
 
 from ...acquisition.safety.stop_latch import StopLatch
 from ...acquisition.session import DriverSession
-from ...acquisition.settings import DRIVER, IN_FORCE, DriverSettings
-from ...errors import ParameterError, PiezoError, StageError, reason_of
+from ...acquisition.settings import DRIVER, DriverSettings
+from ...errors import PiezoError, StageError, reason_of
 from ...record import Record
 from ...stage.back_ends import BACK_ENDS
 from ..messages.frame import frame_name
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.node_clock import now
-from ..runtime.parameters import declare, read
+from ..runtime.parameters import read
 from ..runtime.process import run
 from .commands import DriverCommands
 from .diagnostics import DriverDiagnostics
+from .parameters import DriverParameters, refuse_simulated_time
 from .publishers import DriverTopics
 from .second_driver import refuse_second_driver
-
-_SIMULATED_TIME = "use_sim_time"
-"""Parameter of every ROS node: its clock follows /clock."""
-
-_OWN_CLOCK = "a driver stamps samples and checks commands by the clock of the computer"
-"""Reason why a driver refuses this parameter."""
 
 
 class DriverNode(GuardedNode, LifecycleNode):
@@ -65,19 +58,14 @@ class DriverNode(GuardedNode, LifecycleNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("driver_node", **options)
-        if self.get_parameter(_SIMULATED_TIME).value:
-            raise ParameterError(f"{_SIMULATED_TIME}: got true, expected false; {_OWN_CLOCK}")
+        refuse_simulated_time(self)
         self.hold_name()
-        declare(self, DRIVER)
-        for word, back_end in BACK_ENDS.items():
-            declare(self, back_end.rows, f"{word}.")
-        declare(self, IN_FORCE, "in_force.")
         self._session: DriverSession | None = None
         self._topics: DriverTopics | None = None
         self._failure: PiezoError | None = None
-        self._in_force_changes, self._latch = False, StopLatch()
+        self._latch = StopLatch()
+        self._own_parameters = DriverParameters(self, self._latch, lambda: self._session is not None)
         self._diagnostics = DriverDiagnostics(self, self._latch)
-        self.add_on_set_parameters_callback(self._refuse_while_configured)
         self._commands = DriverCommands(self, self._diagnostics, self._latch, self._latch_changed)
 
     def begin(self) -> None:
@@ -107,13 +95,14 @@ class DriverNode(GuardedNode, LifecycleNode):
                 refuse_second_driver(self, settings.discovery_time)
                 topics = DriverTopics(self, session.limits.name, frame, session.sample_period, settings.live_rate)
                 undo.callback(topics.destroy)
-                undo.callback(self._clear_in_force)
-                self._publish_in_force(session.in_force())
+                undo.callback(self._own_parameters.clear_in_force)
+                self._own_parameters.publish_in_force(session.in_force())
                 undo.pop_all()
         except Exception as error:  # rclpy would end the transition without a message
             self._report_failure(error)
             return TransitionCallbackReturn.FAILURE
-        self._session, self._topics = session, topics
+        self._session = session
+        self._topics = topics
         self._commands.attach(session, topics)
         self._diagnostics.state(DiagnosticStatus.OK, "configured, not active", session.limits.name)
         self.get_logger().info(f"configured: {session.limits.name}, {1 / session.sample_period:g} samples per second")
@@ -123,7 +112,8 @@ class DriverNode(GuardedNode, LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin to publish samples."""
-        topics, session = self._topics, self._session
+        session = self._session
+        topics = self._topics
         if topics is None or session is None:
             self._report_failure(StageError("activate: got no open stage, expected one; configure the driver first"))
             return TransitionCallbackReturn.FAILURE
@@ -146,7 +136,8 @@ class DriverNode(GuardedNode, LifecycleNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Ramp to the safe voltage, then stop the samples; an error if the stage was not seen there."""
         self._diagnostics.watch(None)
-        session, has_failed = self._session, self._failure is not None
+        session = self._session
+        has_failed = self._failure is not None
         try:
             if session is not None:
                 session.make_safe()
@@ -185,7 +176,10 @@ class DriverNode(GuardedNode, LifecycleNode):
         self._diagnostics.watch(None)
         session, self._session = self._session, None
         topics, self._topics = self._topics, None
-        for end in (self._clear_in_force, *((session.close,) if session is not None else ())):
+        ends = [self._own_parameters.clear_in_force]
+        if session is not None:
+            ends.append(session.close)
+        for end in ends:
             try:
                 end()
             except Exception as error:
@@ -211,42 +205,13 @@ class DriverNode(GuardedNode, LifecycleNode):
             self.executor.create_task(self.guarded(self._publish_latch))
 
     def _publish_latch(self) -> None:
-        self._publish_in_force({"stopped": self._latch.is_set})
+        self._own_parameters.publish_in_force({"stopped": self._latch.is_set})
         self._diagnostics.publish()
 
     def _report_failure(self, error: Exception) -> None:
         reason = reason_of(error)
         self.get_logger().error(reason)
         self._diagnostics.state(DiagnosticStatus.ERROR, reason)
-
-    def _publish_in_force(self, values: Mapping[str, object]) -> None:
-        self._in_force_changes = True
-        try:
-            self.set_parameters([Parameter(f"in_force.{name}", value=value) for name, value in values.items()])
-        finally:
-            self._in_force_changes = False
-
-    def _clear_in_force(self) -> None:
-        self._publish_in_force({row.name: row.value for row in IN_FORCE} | {"stopped": self._latch.is_set})
-
-    def _refuse_while_configured(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Refuse changes that would have no effect, because the parameters are read at configure."""
-        ours = {row.name for row in DRIVER}
-        for name in (parameter.name for parameter in parameters):
-            reason = ""
-            if name == _SIMULATED_TIME:
-                reason = f"{name}: {_OWN_CLOCK}"
-            elif name.startswith("in_force."):
-                own = name.removeprefix("in_force.")
-                reason = "" if self._in_force_changes else f"{name} is read only; set {own} instead"
-            elif self._session is not None and (name in ours or name.split(".")[0] in BACK_ENDS):
-                reason = (
-                    f"{name} is read when the driver is configured; deactivate and clean up the driver, set it, "
-                    "and configure again"
-                )
-            if reason:
-                return SetParametersResult(successful=False, reason=reason)
-        return SetParametersResult(successful=True)
 
 
 def _records(path: str) -> tuple[Record, ...]:
