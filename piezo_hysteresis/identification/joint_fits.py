@@ -41,7 +41,7 @@ from .steps.order_choice import OrderError, choose_order, compare_orders
 from .steps.remaining_lag import lag_notices
 from .structure.broadband_part import BroadbandPart
 from .structure.left_out import score_left_out
-from .structure.structure_choice import LEADS, TIE, StructureChoice, choose_structure
+from .structure.structure_choice import LEADS, StructureChoice, choose_structure
 
 AT_THE_FLOOR = 1.5
 """Mean square of residual over floor below which a fit describes the records, independent of its last step."""
@@ -190,7 +190,7 @@ def fit_structured_broadband(
     alone, whole = (score_left_out(m, records, quiet, fitted) for m in (start, choice.fit.model))
     errors = f"{np.exp(0.5 * alone):.3g} and {np.exp(0.5 * whole):.3g} times the noise floor"
     said = f"prediction errors of hysteresis with ARX dynamics alone, and of the structure chosen, are {errors}"
-    margin = LEADS if MEMORY.name in choice.fit.model else -TIE
+    margin = LEADS if MEMORY.name in choice.fit.model else -LEADS
     if not whole < alone + margin:
         return replace(published, notices=(*published.notices, Notice("structure", f"{said}, so they are used alone")))
     if not whole < alone:
