@@ -143,14 +143,14 @@ def identify(
     dead = 1.0 if delay is None else max(1.0, delay.time / period)
     frame = Model((hysteresis(), Arx(a=(), b=(gauge.gain,), delay=dead)), period, scale_v, scale_y)
     start = behind_the_gauge(frame, published, records, roles.loops)
-    inputs = FitInput(start, records, floors, roles, reach, report)
+    inputs = FitInput(start, records, floors, roles, reach, natural, gauge, report)
     structured = memory and start.hysteresis.memoryless() is not None
     if roles.broadband:
         found = fit_broadband(inputs, None if delay is None else round(dead), orders)
         if structured:
-            found = fit_structured_broadband(found, inputs, orders, natural, gauge)
+            found = fit_structured_broadband(found, inputs, orders)
     elif structured:
-        found = fit_structured(inputs, natural, gauge)
+        found = fit_structured(inputs)
     else:
         found = fit_loops(inputs)
     report("free run", 0.95)

@@ -65,6 +65,8 @@ class FitInput:
         What each record is used for.
     reach : float
         Largest range of the displacement of a record [m].
+    natural, gauge : Gauge
+        Natural gauge of the records, in which the structure is chosen, and that of the result.
     report : callable
         Called with the name of the step and the fraction done.
     """
@@ -74,6 +76,8 @@ class FitInput:
     floors: Sequence[float]
     roles: Roles
     reach: float
+    natural: Gauge
+    gauge: Gauge
     report: Progress
 
 
@@ -153,9 +157,7 @@ def fit_broadband(given: FitInput, delay: int | None, orders: tuple[int, int] | 
     return FitOutcome(fit, corrected, tuple(notices), dynamics, table, comparisons)
 
 
-def fit_structured_broadband(
-    published: FitOutcome, given: FitInput, orders: tuple[int, int] | None, natural: Gauge, gauge: Gauge
-) -> FitOutcome:
+def fit_structured_broadband(published: FitOutcome, given: FitInput, orders: tuple[int, int] | None) -> FitOutcome:
     """Choose the structure beside broadband records, unless the published model describes or predicts them as well.
 
     Parameters
@@ -166,8 +168,6 @@ def fit_structured_broadband(
         Start, records and floors.
     orders : (int, int) or None
         Highest na and nb; None takes them from the comparison of orders.
-    natural, gauge : Gauge
-        Natural gauge of the records, in which the structure is chosen, and that of the result.
 
     Raises
     ------
@@ -176,14 +176,14 @@ def fit_structured_broadband(
     """
     if published.fit.cost <= AT_THE_FLOOR:
         return published
-    gauge.require_sign(natural)
+    given.gauge.require_sign(given.natural)
     records, fitted = published.records, given.roles.fitted
     quiet = _quiet(records, given.reach)
 
     def report(word: str, part: float) -> None:
         given.report(word, 0.5 + 0.4 * part)
 
-    start = natural.of_model(published.fit.model)
+    start = given.natural.of_model(published.fit.model)
     highest = orders or (choose_order(published.orders),) * 2
     dynamics = BroadbandPart(start, records, given.roles.broadband, highest)
     choice = choose_structure(start, records, quiet, fitted, report, dynamics.fit)
@@ -195,7 +195,7 @@ def fit_structured_broadband(
         return replace(published, notices=(*published.notices, Notice("structure", f"{said}, so they are used alone")))
     if not whole < alone:
         said += "; plays are preferred up to a small difference, because they stay inside the largest measured loop"
-    fit, notices = gauge.of_fit(choice.fit), published.notices
+    fit, notices = given.gauge.of_fit(choice.fit), published.notices
     if form_of(fit.model)[2] != form_of(start)[2]:
         notices = tuple(n for n in notices if n.kind != "order_reduced")
     notices = (*notices, *choice.notices, Notice("structure", said))
@@ -207,22 +207,20 @@ def _quiet(records: Sequence[Record], reach: float) -> list[float]:
     return [max(noise, ADEQUACY * reach) for noise in sensor_noise(records)]
 
 
-def fit_structured(given: FitInput, natural: Gauge, gauge: Gauge) -> FitOutcome:
+def fit_structured(given: FitInput) -> FitOutcome:
     """Choose the structure without broadband records, and fit it; `fit.model` has the gauge that was asked for.
 
     Parameters
     ----------
     given : FitInput
         Start, records and floors.
-    natural, gauge : Gauge
-        Natural gauge of the records, in which the structure is chosen, and that of the result.
 
     Raises
     ------
     ParameterError
         If G(1) of the gauge has the wrong sign for plays.
     """
-    gauge.require_sign(natural)
+    given.gauge.require_sign(given.natural)
     start, records, roles = given.start, given.records, given.roles
     notices: tuple[Notice, ...] = ()
     if any(r.sample_period > 1.001 * start.sample_period for r in records):
@@ -234,8 +232,8 @@ def fit_structured(given: FitInput, natural: Gauge, gauge: Gauge) -> FitOutcome:
     def report(word: str, part: float) -> None:
         given.report(word, 0.2 + 0.7 * part)
 
-    choice = choose_structure(natural.of_model(start), records, quiet, roles.fitted, report)
-    fit = gauge.of_fit(choice.fit)
+    choice = choose_structure(given.natural.of_model(start), records, quiet, roles.fitted, report)
+    fit = given.gauge.of_fit(choice.fit)
     of_lag = lag_notices(fit, [roles.contents[i] for i in roles.fitted], rivals_counted=True)
     return FitOutcome(fit, records, (*notices, *choice.notices, *of_lag), structure=replace(choice, fit=fit))
 

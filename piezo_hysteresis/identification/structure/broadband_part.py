@@ -77,8 +77,8 @@ class BroadbandPart:
 
     def _again(self, model: Model) -> Iterator[Model]:
         """The model with dynamics estimated again behind its effects, of every order that the ladder has."""
+        delay = round(dynamics_of(model)["delay"])
         for orders in ladder(self.orders):
             with suppress(IdentificationError):
-                delay = round(dynamics_of(model)["delay"])
                 arx = dynamics_behind(model, self.records, self.broadband, delay, orders).arx
                 yield with_dynamics(model, arx)
