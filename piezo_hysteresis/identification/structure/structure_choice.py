@@ -23,7 +23,8 @@ one pole and one lightly damped mode, and ARX of higher order where a step shows
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -81,11 +82,10 @@ class StructureChoice:
     fit : Fit
         Fit of the chosen structure; its covariance includes the spread over the folds and over rival structures.
     judged : tuple of Judged
-        Every structure, best first.
+        Every structure with the chosen kind of hysteresis, best first.
     leads : mapping of str to float
         For every optional effect, the score (mean ln R²) of the best structure without it minus the score of the chosen
-        one, if there are structures without it. If the state of the operator was kept, all of them are structures with
-        the operator.
+        one, if there are structures without it; both have the chosen kind of hysteresis.
     notices : tuple of Notice
         ``structure``, ``memory``, ``ringing``, ``step_edge``, ``amplifier``, ``step_time``.
     """
@@ -94,6 +94,32 @@ class StructureChoice:
     judged: tuple[Judged, ...]
     leads: Mapping[str, float]
     notices: tuple[Notice, ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Family:
+    """The structures with one kind of hysteresis: the fit with all effects, the scores, best first, and the choice."""
+
+    full: PieceFit
+    judged: tuple[Judged, ...]
+    chosen: Judged
+
+    @classmethod
+    def of(cls, full: PieceFit, pieces: Sequence[RecordPiece], offered: Sequence[ModelStructure]) -> _Family:
+        judged = sorted(judge(full, pieces, offered), key=lambda j: j.score)
+        likely = [j for j in judged if not j.score > judged[0].score + TIE]
+        return cls(full, tuple(judged), min(likely, key=lambda j: (j.structure.size, j.score)))
+
+    @property
+    def described(self) -> str:
+        """The errors of the best structures, and of the chosen one if it is not among them."""
+        listed = dict.fromkeys((*self.judged[:3], self.chosen))
+        return "; ".join(f"{self.words(j)} {np.exp(0.5 * j.score):.3g}" for j in listed)
+
+    def words(self, judged: Judged) -> str:
+        """The effects of a structure."""
+        loop = self.full.model.hysteresis
+        return " + ".join((loop.name if loop.has_memory else "plays + cubic", *judged.structure.effects))
 
 
 def choose_structure(
@@ -134,43 +160,28 @@ def choose_structure(
         if all(p.share == 1.0 for p in pieces):
             break
         full = fit_structure(full.model, pieces, sizes, held)
-    judged = sorted(judge(full, pieces, _offered(pieces)), key=lambda j: j.score)
-    best = judged[0]
-    chosen = min((j for j in judged if not j.score > best.score + TIE), key=lambda j: (j.structure.size, j.score))
-    progress("structure: fit", 0.7)
-    final = fit_structure(_reduced(full.model, chosen), pieces, sizes, held)
-    progress("structure: rival", 0.85)
-    described = "; ".join(f"{_words(j.structure)} {np.exp(0.5 * j.score):.3g}" for j in _listed(judged, chosen))
-    rival, lead = _rival(start, final, pieces, sizes)
-    notices = linear.notices(rival or final)
-    notices.append(
-        Notice(
-            "structure",
-            f"by prediction of rates, amplitudes and records left out, {_words(chosen.structure)} was chosen"
-            f"{'' if rival is None else ' among the structures with plays'}{'' if chosen is best else SIMPLER}; "
-            f"prediction errors in units of the noise floor: {described}",
-        )
+    progress("structure: rival", 0.6)
+    family, lead = _with_plays_or_operator(start, full, pieces, sizes)
+    progress("structure: fit", 0.8)
+    chosen, judged = family.chosen, family.judged
+    final = fit_structure(_reduced(family.full.model, chosen), pieces, sizes, held)
+    message = (
+        f"by prediction of rates, amplitudes and records left out, {family.words(chosen)} was chosen"
+        f"{'' if chosen is judged[0] else SIMPLER}; prediction errors in units of the noise floor: {family.described}"
     )
-    if rival is not None:
+    notices = [*linear.notices(final), Notice("structure", message)]
+    leads = {**linear.leads, **_leads(chosen, judged)}
+    if MEMORY.name not in final.model:
         message = f"predicts data left out better than the plays by a factor of {np.exp(0.5 * lead):.3g}"
-        notices.append(Notice("memory", f"{start.hysteresis.name} {message}, so it takes their place"))
-        nothing = np.zeros((len(rival.names),) * 2)
-        leads = {**linear.leads, **_leads_of_operator(start, full, chosen, pieces, sizes)}
-        fit = as_fit(rival, pieces, sizes, nothing, linear.open_lag)
-        return StructureChoice(fit, tuple(judged), leads, tuple(notices))
-    message = f"{MEMORY.name} is used: the stage remembers its turning points"
-    if not final.model[MEMORY.name].array("c").any():
-        message = "no hysteresis was found: the weights of all plays are 0"
+        message = f"{start.hysteresis.name} {message}, so it takes their place"
+    else:
+        leads[MEMORY.name] = -lead
+        message = f"{MEMORY.name} is used: the stage remembers its turning points"
+        if not final.model[MEMORY.name].array("c").any():
+            message = "no hysteresis was found: the weights of all plays are 0"
     notices.append(Notice("memory", message))
-    spread = spread_of(full, final, chosen, judged)
-    leads = {MEMORY.name: -lead, **linear.leads, **_leads(chosen, judged)}
-    fit = as_fit(final, pieces, sizes, spread, linear.open_lag)
-    return StructureChoice(fit, tuple(judged), leads, tuple(notices))
-
-
-def _listed(judged: Sequence[Judged], chosen: Judged) -> list[Judged]:
-    """The best structures, and the chosen one if it is not among them."""
-    return [*judged[:3], *([chosen] if chosen not in judged[:3] else [])]
+    fit = as_fit(final, pieces, sizes, spread_of(family.full, final, chosen, judged), linear.open_lag)
+    return StructureChoice(fit, judged, leads, tuple(notices))
 
 
 def _leads(chosen: Judged, judged: Sequence[Judged]) -> dict[str, float]:
@@ -182,19 +193,6 @@ def _leads(chosen: Judged, judged: Sequence[Judged]) -> dict[str, float]:
         if rest:
             found[name] = min(rest) - chosen.score
     return found
-
-
-def _leads_of_operator(
-    start: Model, full: PieceFit, chosen: Judged, pieces: Sequence[RecordPiece], floors: Sequence[float]
-) -> dict[str, float]:
-    """The leads of the chosen effects beside the operator instead of plays; none if its fit diverges."""
-    try:
-        whole = fit_structure(_with_operator(full.model, start), pieces, floors, held_by(full))
-    except PiezoError:
-        return {}
-    judged = list(judge(whole, pieces, [s for s in _offered(pieces) if not s.level]))
-    kept = replace(chosen.structure, level=False)
-    return _leads(next(j for j in judged if j.structure == kept), judged)
 
 
 def _offered(pieces: Sequence[RecordPiece]) -> list[ModelStructure]:
@@ -247,18 +245,18 @@ def _with_operator(model: Model, start: Model) -> Model:
     return model.without(MEMORY.level_term.name).without(MEMORY.name).with_hysteresis(start.hysteresis)
 
 
-def _rival(
-    start: Model, final: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]
-) -> tuple[PieceFit | None, float]:
-    """The fit with the operator instead of plays if it predicts clearly better, and the difference of the scores."""
-    same = ModelStructure(True, 2, True)
-    try:
-        rival = fit_structure(_with_operator(final.model, start), pieces, floors, held_by(final))
-        lead = next(judge(final, pieces, (same,))).score - next(judge(rival, pieces, (same,))).score
-    except PiezoError:
-        return None, 0.0
-    return (rival, lead) if lead > LEADS else (None, lead)
+def _with_plays_or_operator(
+    start: Model, full: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]
+) -> tuple[_Family, float]:
+    """The structures with plays, or with the operator if it predicts clearly better, and the difference of the scores.
 
-
-def _words(structure: ModelStructure) -> str:
-    return " + ".join(("plays + cubic", *structure.effects))
+    The effects beside the operator are chosen anew: those beside plays may describe what plays leave of its loops.
+    """
+    offered = _offered(pieces)
+    plays = _Family.of(full, pieces, offered)
+    with suppress(PiezoError):
+        whole = fit_structure(_with_operator(full.model, start), pieces, floors, held_by(full))
+        operator = _Family.of(whole, pieces, [s for s in offered if not s.level])
+        lead = plays.chosen.score - operator.chosen.score
+        return (operator if lead > LEADS else plays), lead
+    return plays, 0.0
