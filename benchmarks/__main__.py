@@ -37,6 +37,7 @@ QUALITY = (
     "export",
     "fleet",
     "page",
+    "prediction",
     "rates",
     "recovery",
     "table_1",
