@@ -74,7 +74,7 @@ def fit_linear_part(model: Model, pieces: Sequence[RecordPiece], floors: Sequenc
     plain = min(found, key=lambda f: f.cost)
     best, lead = _with_poles_and_mode(plain, pieces, floors)
     start, late, refused = best, with_slew_limit(best, pieces, floors), list[PieceFit]()
-    if not is_settled(best, pieces):
+    if late is not best and not is_settled(best, pieces):  # some record begins with a step
         limited, its_lead = _behind_slew_limit(plain, late, lead, pieces, floors)
         if max(_shares_left(limited, best, pieces)) < SECOND:
             best, lead = limited, its_lead
