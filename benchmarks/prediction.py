@@ -17,8 +17,8 @@
 Three experiments with stages of `benchmarks.other_forms` are fitted, and five other drives are predicted in free run. A
 converter of 14 bits reads the displacement. Every stage was driven up and back before each record, which no record
 shows. The rival is what a laboratory fits in an afternoon: ten plays and a linear part by least squares, before one
-mode and a delay; it is told what was driven before. Errors are RMS in % of the range of the triangles, one constant free
-per record; all means are geometric.
+mode and a delay; it is told what was driven before. Errors are RMS in % of the range of the triangles, one constant
+free per record; all means are geometric.
 
     python -m benchmarks.prediction --stages 2
     python -m benchmarks.prediction --quick
