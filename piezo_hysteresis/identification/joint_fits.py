@@ -44,7 +44,7 @@ from .structure.left_out import score_left_out
 from .structure.structure_choice import LEADS, StructureChoice, choose_structure
 
 AT_THE_FLOOR = 1.5
-"""Mean square of residual over floor below which a fit describes the records, independent of its last step."""
+"""Mean square of the residual, or of the error of prediction, in floors, up to which a model describes the records."""
 HIGHEST_ORDER = 10
 """Highest model order of the comparison."""
 
@@ -174,20 +174,20 @@ def fit_structured_broadband(published: FitOutcome, given: FitInput, orders: tup
     ParameterError
         If G(1) of the gauge has the wrong sign for plays.
     """
-    if published.fit.cost <= AT_THE_FLOOR:
+    records, fitted = published.records, given.roles.fitted
+    quiet, start = _quiet(records, given.reach), given.natural.of_model(published.fit.model)
+    alone = score_left_out(start, records, quiet, fitted)
+    if alone <= np.log(AT_THE_FLOOR):
         return published
     given.gauge.require_sign(given.natural)
-    records, fitted = published.records, given.roles.fitted
-    quiet = _quiet(records, given.reach)
 
     def report(word: str, part: float) -> None:
         given.report(word, 0.5 + 0.4 * part)
 
-    start = given.natural.of_model(published.fit.model)
     highest = orders or (choose_order(published.orders),) * 2
     dynamics = BroadbandPart(start, records, given.roles.broadband, highest)
-    choice = choose_structure(start, records, quiet, fitted, report, dynamics.fit)
-    alone, whole = (score_left_out(m, records, quiet, fitted) for m in (start, choice.fit.model))
+    choice = choose_structure(start, records, quiet, fitted, report, dynamics.fit, dynamics.fit)
+    whole = score_left_out(choice.fit.model, records, quiet, fitted)
     errors = f"{np.exp(0.5 * alone):.3g} and {np.exp(0.5 * whole):.3g} times the noise floor"
     said = f"prediction errors of hysteresis with ARX dynamics alone, and of the structure chosen, are {errors}"
     margin = LEADS if MEMORY.name in choice.fit.model else -LEADS

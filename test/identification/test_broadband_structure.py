@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from piezo_hysteresis.effects import HYSTERESIS, MEMORY, Arx, Offset
+from piezo_hysteresis.effects import HYSTERESIS, MEMORY, Arx, Creep, CreepTwoRates, Offset
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
@@ -101,13 +101,34 @@ def test_the_dynamics_hold_the_mode_that_the_noise_shows(found):
     assert np.abs(frequency - warped).min() < 1.0
 
 
-def test_a_stage_of_the_published_form_keeps_it():
+def published(*others, lasts=1):
+    """Records of a stage of the published form with further effects, with noise of 5 nm; every drive stays at its end.
+
+    They last `lasts` times as long as the drives.
+    """
     loop = HYSTERESIS(p1=0.0, p2=0.6, A=0.5, beta=1.2, gamma=0.4)
-    stage = Model((loop, Arx(a=(-1.4, 0.6), b=(0.2,), delay=2.0)), 1.0 / RATE, 10.0, 1e-5)
+    stage = Model((loop, *others, Arx(a=(-1.4, 0.6), b=(0.2,), delay=2.0)), 1.0 / RATE, 10.0, 1e-5)
     noise = np.random.default_rng(0)
     records = []
     for phase, u in drives().items():
+        u = np.pad(u, (0, (lasts - 1) * u.size), "edge")
         clean = Record(u, np.zeros(u.size), 1.0 / RATE, phase)
         records.append(Record(u, stage.simulate(clean)[0] + 5e-9 * noise.standard_normal(u.size), 1.0 / RATE, phase))
-    found = identify(Experiment(tuple(records)), memory=True)
-    assert [e.name for e in found.model.effects] == [loop.name, Arx.name, Offset.name]
+    return Experiment(tuple(records))
+
+
+def test_a_stage_of_the_published_form_keeps_it():
+    experiment = published()
+    found = identify(experiment, memory=True)
+    assert [e.name for e in found.model.effects] == [HYSTERESIS.name, Arx.name, Offset.name]
+
+
+def test_creep_beside_the_operator_is_not_taken_for_a_slow_pole():
+    """Dynamics that are estimated without creep have a pole that stands for it."""
+    found = identify(published(Creep(gamma=0.005), lasts=4), memory=True)
+    assert found.free_run_error < 1.05 * 5e-9
+    names = {e.name for e in found.model.effects}
+    assert HYSTERESIS.name in names and {Creep.name, CreepTwoRates.name} & names
+    for name in (n for n in found.fit.names if n.startswith("creep") and "gamma" in n):
+        low, high = found.fit.interval(name)
+        assert low < 0.005 < high

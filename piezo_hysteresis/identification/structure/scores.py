@@ -36,6 +36,8 @@ MOST_LEFT_OUT = 0.75
 """Largest share of the experiment that a fold leaves out; every record has the same weight."""
 FEWEST = 3
 """With fewer folds than this, every piece becomes a further fold."""
+TIE = 0.02
+"""Difference of scores (mean ln R²) within which the structure with fewer parameters is chosen."""
 FAST, SLOW = f"{CreepTwoRates.name}.gamma_fast", f"{CreepTwoRates.name}.gamma_slow"
 """Parameters of the creep rates in the full model."""
 
@@ -108,6 +110,43 @@ class Judged:
     without: Array
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Ranking:
+    """The structures with one kind of hysteresis.
+
+    Parameters
+    ----------
+    full : PieceFit
+        Fit of the model with all optional effects.
+    judged : tuple of Judged
+        Scores of the structures, best first.
+    chosen : Judged
+        The simplest structure that is about as good as the best one.
+    """
+
+    full: PieceFit
+    judged: tuple[Judged, ...]
+    chosen: Judged
+
+    @classmethod
+    def of(cls, full: PieceFit, pieces: Sequence[RecordPiece], offered: Sequence[ModelStructure]) -> Ranking:
+        """Score the structures that are offered, as `judge` does."""
+        judged = sorted(judge(full, pieces, offered), key=lambda j: j.score)
+        likely = [j for j in judged if not j.score > judged[0].score + TIE]
+        return cls(full, tuple(judged), min(likely, key=lambda j: (j.structure.size, j.score)))
+
+    @property
+    def described(self) -> str:
+        """The errors of the best structures, and of the chosen one if it is not among them."""
+        listed = dict.fromkeys((*self.judged[:3], self.chosen))
+        return "; ".join(f"{self.words(j)} {np.exp(0.5 * j.score):.3g}" for j in listed)
+
+    def words(self, judged: Judged) -> str:
+        """The effects of a structure."""
+        loop = self.full.model.hysteresis
+        return " + ".join((loop.name if loop.has_memory else "plays + cubic", *judged.structure.effects))
+
+
 def folds_of(pieces: Sequence[RecordPiece]) -> list[Mask]:
     """Folds as masks of the used pieces: every rate, every amplitude and every record is left out once.
 
@@ -148,8 +187,7 @@ def judge(full: PieceFit, pieces: Sequence[RecordPiece], structures: Sequence[Mo
         Structures to score.
     """
     folds = folds_of(pieces)
-    kinds = [p.kind for p in pieces if WEIGHTS[p.kind] > 0.0]
-    held = np.array([k is Kind.HOLD for k in kinds])
+    held = np.array([p.kind is Kind.HOLD for p in pieces if WEIGHTS[p.kind] > 0.0])
     for structure in structures:
         free, fixed, low, high = _space(full, structure)
         whole = _solve(full.total, free, fixed, low, high)
@@ -173,8 +211,7 @@ def _space(full: PieceFit, structure: ModelStructure) -> tuple[Array, Array, Arr
     size = full.matrices.shape[1] - 1
     values = full.model.values()
     low, high = full.box()
-    fixed, kept = np.zeros(size), list(range(size))
-    free = np.eye(size)
+    fixed, kept, free = np.zeros(size), list(range(size)), np.eye(size)
     for k, name in enumerate(full.names):
         if structure.is_held(name):
             fixed[k] = -values[name]

@@ -22,7 +22,7 @@ one pole and one lightly damped mode, and ARX of higher order where a step shows
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -47,7 +47,7 @@ from .mode import held_by
 from .piece_fit import PieceFit
 from .pieces import Kind, RecordPiece, pieces_of
 from .pole_place import FitLinearPart
-from .scores import STRUCTURES, Judged, ModelStructure, judge
+from .scores import STRUCTURES, TIE, Judged, ModelStructure, Ranking
 from .step_weights import discounted_steps
 from .structure_fit import fit_structure
 from .uncertainty import as_fit, spread_of
@@ -60,8 +60,6 @@ START_CREEP = 0.005
 """Creep per decade of time at which a fit starts."""
 DISCOUNTS = 2
 """Number of times that the weights of steps are adapted to their misfit; the first fit takes part of it up."""
-TIE = 0.02
-"""Difference of scores (mean ln R²) within which the structure with fewer parameters is chosen."""
 SIMPLER = f", because it is the simplest within {100 * np.expm1(0.5 * TIE):.0f} % of the best one"
 """Addition to the message if the chosen structure is not the best one."""
 CREEPS = (Creep.name, CreepTwoRates.name)
@@ -96,32 +94,6 @@ class StructureChoice:
     notices: tuple[Notice, ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Family:
-    """The structures with one kind of hysteresis: the fit with all effects, the scores, best first, and the choice."""
-
-    full: PieceFit
-    judged: tuple[Judged, ...]
-    chosen: Judged
-
-    @classmethod
-    def of(cls, full: PieceFit, pieces: Sequence[RecordPiece], offered: Sequence[ModelStructure]) -> _Family:
-        judged = sorted(judge(full, pieces, offered), key=lambda j: j.score)
-        likely = [j for j in judged if not j.score > judged[0].score + TIE]
-        return cls(full, tuple(judged), min(likely, key=lambda j: (j.structure.size, j.score)))
-
-    @property
-    def described(self) -> str:
-        """The errors of the best structures, and of the chosen one if it is not among them."""
-        listed = dict.fromkeys((*self.judged[:3], self.chosen))
-        return "; ".join(f"{self.words(j)} {np.exp(0.5 * j.score):.3g}" for j in listed)
-
-    def words(self, judged: Judged) -> str:
-        """The effects of a structure."""
-        loop = self.full.model.hysteresis
-        return " + ".join((loop.name if loop.has_memory else "plays + cubic", *judged.structure.effects))
-
-
 def choose_structure(
     start: Model,
     records: Sequence[Record],
@@ -129,6 +101,7 @@ def choose_structure(
     fitted: Collection[int],
     progress: Progress,
     fit_linear: FitLinearPart = fit_linear_part,
+    behind_operator: FitLinearPart | None = None,
 ) -> StructureChoice:
     """Choose the structure of the model, and fit it.
 
@@ -146,12 +119,15 @@ def choose_structure(
         Called with the name of the step and the fraction done.
     fit_linear : callable
         Fits the linear part; by default the one that loops and steps determine.
+    behind_operator : callable, optional
+        Fits the linear part behind the operator; by default, it begins with that behind plays.
     """
     kept = with_conditioning(records, fitted)
     used, sizes = [records[i] for i in kept], [floors[i] for i in kept]
     pieces = pieces_of(used, [k for k, i in enumerate(kept) if i in fitted])
     progress("structure: lag", 0.1)
-    linear = fit_linear(_with_plays(start, used), pieces, sizes)
+    begun = _with_plays(start, used)
+    linear = fit_linear(begun, pieces, sizes)
     full = linear.fit
     progress("structure: effects", 0.4)
     held = held_by(full)
@@ -161,13 +137,19 @@ def choose_structure(
             break
         full = fit_structure(full.model, pieces, sizes, held)
     progress("structure: rival", 0.6)
-    family, lead = _with_plays_or_operator(start, full, pieces, sizes)
+
+    def fit_operator() -> PieceFit:
+        if behind_operator is None:
+            return fit_structure(_with_operator(full.model, start), pieces, sizes, held)
+        return behind_operator(_with_operator(begun, start), pieces, sizes).fit
+
+    ranking, lead = _with_plays_or_operator(full, fit_operator, pieces)
     progress("structure: fit", 0.8)
-    chosen, judged = family.chosen, family.judged
-    final = fit_structure(_reduced(family.full.model, chosen), pieces, sizes, held)
+    chosen, judged = ranking.chosen, ranking.judged
+    final = fit_structure(_reduced(ranking.full.model, chosen), pieces, sizes, held)
     message = (
-        f"by prediction of rates, amplitudes and records left out, {family.words(chosen)} was chosen"
-        f"{'' if chosen is judged[0] else SIMPLER}; prediction errors in units of the noise floor: {family.described}"
+        f"by prediction of rates, amplitudes and records left out, {ranking.words(chosen)} was chosen"
+        f"{'' if chosen is judged[0] else SIMPLER}; prediction errors in units of the noise floor: {ranking.described}"
     )
     notices = [*linear.notices(final), Notice("structure", message)]
     leads = {**linear.leads, **_leads(chosen, judged)}
@@ -180,7 +162,7 @@ def choose_structure(
         if not final.model[MEMORY.name].array("c").any():
             message = "no hysteresis was found: the weights of all plays are 0"
     notices.append(Notice("memory", message))
-    fit = as_fit(final, pieces, sizes, spread_of(family.full, final, chosen, judged), linear.open_lag)
+    fit = as_fit(final, pieces, sizes, spread_of(ranking.full, final, chosen, judged), linear.open_lag)
     return StructureChoice(fit, judged, leads, tuple(notices))
 
 
@@ -246,17 +228,16 @@ def _with_operator(model: Model, start: Model) -> Model:
 
 
 def _with_plays_or_operator(
-    start: Model, full: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]
-) -> tuple[_Family, float]:
+    full: PieceFit, fit_operator: Callable[[], PieceFit], pieces: Sequence[RecordPiece]
+) -> tuple[Ranking, float]:
     """The structures with plays, or with the operator if it predicts clearly better, and the difference of the scores.
 
     The effects beside the operator are chosen anew: those beside plays may describe what plays leave of its loops.
     """
     offered = _offered(pieces)
-    plays = _Family.of(full, pieces, offered)
+    plays = Ranking.of(full, pieces, offered)
     with suppress(PiezoError):
-        whole = fit_structure(_with_operator(full.model, start), pieces, floors, held_by(full))
-        operator = _Family.of(whole, pieces, [s for s in offered if not s.level])
+        operator = Ranking.of(fit_operator(), pieces, [s for s in offered if not s.level])
         lead = plays.chosen.score - operator.chosen.score
         return (operator if lead > LEADS else plays), lead
     return plays, 0.0
