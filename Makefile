@@ -7,7 +7,7 @@ RUN := scripts/run
 
 setup: install/.built                 ## .venv with ROS 2 and all dependencies, and the colcon build
 demo: setup ; @$(RUN) python examples/demo $(DEMO)
-test: setup .venv/.checked ; @$(RUN) python -m pytest -n 4 --dist loadgroup --max-worker-restart 0 $(TEST)
+test: setup .venv/.checked ; @$(RUN) python -m pytest -n 4 --dist loadgroup --max-worker-restart 2 $(TEST)
 lint: setup ; @scripts/lint
 bench: setup .venv/.checked ; @$(RUN) python -m benchmarks $(BENCH)
 bench-naming: setup ; @$(RUN) python -m benchmarks.naming $(BENCH)

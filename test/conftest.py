@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Three processes share the tests file by file, so that none of them waits while another one still has many files.
+"""Four processes share the tests file by file, so that none of them waits while another one still has many files.
 
 Tests that start nodes wait most of their time. Three such files at once take less of the processors than two of them
 beside a test that computes. Files that open an emulated device, whose lock one process at a time may have, stay in one
@@ -20,7 +20,8 @@ process, and so do those that open a browser, which draws with the processor.
 
 Tests of real processes over DDS, or of a device that a keeper makes safe when its driver is late, need the processor in
 time. One that fails is tried once more, and reported as RERUN: a promise that does not hold fails twice, a computer
-that was busy elsewhere does not. Nor does it fail a property: no example has a deadline.
+that was busy elsewhere does not. Nor does it fail a property: no example has a deadline. The same holds for a test of
+nodes in whose process a library crashes.
 
 A shell starts a background job with SIGINT ignored, and nohup its command with SIGHUP ignored, and every process below
 inherits that. Tests that send these signals need them to arrive.
@@ -33,6 +34,7 @@ import signal
 
 import pytest
 from hypothesis import settings
+from xdist.scheduler import LoadGroupScheduling
 
 os.environ.setdefault("PYTHON_CPU_COUNT", "1")
 settings.register_profile("patient", deadline=None)
@@ -53,3 +55,25 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         item.add_marker(pytest.mark.xdist_group(group))
         if nodes or device:
             item.add_marker(pytest.mark.flaky(reruns=1))
+
+
+class Scheduler(LoadGroupScheduling):
+    """Lets the other processes finish the tests of one that died; `LoadGroupScheduling` hangs or fails there."""
+
+    def remove_node(self, node):
+        """Take a process out; the test in which it died is tried again."""
+        work = self.assigned_work[node]
+        self.assigned_work[node] = {name: tests for name, tests in work.items() if not all(tests.values())}
+        return super().remove_node(node)
+
+    def mark_test_pending(self, item):
+        """Nothing to do: the test has not been finished."""
+
+    def _reschedule(self, node):
+        """Give a process work; not to one that still collects the tests."""
+        if node in self.registered_collections:
+            super()._reschedule(node)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log):
+    return Scheduler(config, log)
