@@ -72,7 +72,9 @@ class PlayTerms:
     weights, radii : (s,) ndarray
         c_j, and half widths in units of v.
     virgin : float
-        State at rest: 0 for centred plays, 1 for the state after a ramp from 0 V.
+        State at rest: 0 for centred plays, 1 for the state after the drive before the rest.
+    before : (s,) ndarray or None
+        Plays before the drive came to the rest; None for plays at 0.
     root : (3, s) ndarray or None
         a_j, b_j and q of the weights that depend on the level (`level_density`); None if they do not.
     """
@@ -80,6 +82,7 @@ class PlayTerms:
     weights: Array
     radii: Array
     virgin: float = 0.0
+    before: Array | None = None
     root: Array | None = None
 
 

@@ -163,7 +163,8 @@ class NonlinearPart:
             "PLAYS": self.radii.size,
         }
         root = self.weights[1:].ravel()
-        plays = {"c": self.weights[0], "root": root, "radius": self.radii}
+        held = np.zeros_like(self.radii) if self._plays.before is None else self._plays.before
+        plays = {"c": self.weights[0], "root": root, "radius": self.radii, "earlier": held}
         # C has no empty arrays
         numbers |= {name: values if values.size else np.zeros(1) for name, values in plays.items()}
         numbers |= {"loop": np.array(self.loop + self.periods), "poly": np.array(self.poly)}

@@ -185,7 +185,7 @@ s->slewed = s->pole = s->pushed = s->held = x - ramp(x - upper, corner) + ramp(l
 s->h = h0;
 s->v = s->held * per_volt;
 for (j = 0; j < PLAYS; j++) {
-    s->play[j] = s->v - virgin * smaller(larger(s->v, -radius[j]), radius[j]);
+    s->play[j] = s->v - virgin * smaller(larger(s->v - earlier[j], -radius[j]), radius[j]);
 }
 {
     const hysteresis_before b = { loop, poly, c, root, radius, s->play, PLAYS, s->h, s->v };

@@ -35,13 +35,13 @@ from ..identification.fit.fit import Fit
 from ..identification.fit.time_limit import TimeSpentError, ending_at
 from ..identification.identification import Identification
 from ..identification.identify import identify
+from ..identification.left_out import has_several_drives, score_left_out
 from ..identification.records.conditioning import with_conditioning
 from ..identification.records.excitation_check import missing_excitation
 from ..identification.records.noise_floor import ADEQUATE, floors, noise_floors, noise_of_averages
 from ..identification.records.roles import roles_of
 from ..identification.records.sampling import shortened
 from ..identification.start_models import as_conditioning
-from ..identification.structure.left_out import has_several_drives, score_left_out
 from ..identification.structure.structure_choice import LEADS
 from ..model.model import Model
 from ..record import Record

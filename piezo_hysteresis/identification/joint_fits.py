@@ -30,6 +30,7 @@ from .fit.form_uncertainty import ADEQUACY, with_form_uncertainty
 from .fit.gauge import Gauge
 from .fit.joint import fit_dynamics, fit_joint, fit_lag, without_intersample_error
 from .fit.normal_equations import Nuisance
+from .left_out import score_left_out
 from .records.conditioning import records_to_fit
 from .records.leading_step import Blocks, steps_apart
 from .records.noise import sensor_noise
@@ -40,7 +41,6 @@ from .steps.linear_start import form_of, hysteresis_signals
 from .steps.order_choice import OrderError, choose_order, compare_orders
 from .steps.remaining_lag import lag_notices
 from .structure.broadband_part import BroadbandPart
-from .structure.left_out import score_left_out
 from .structure.structure_choice import LEADS, StructureChoice, choose_structure
 
 AT_THE_FLOOR = 1.5

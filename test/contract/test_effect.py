@@ -58,6 +58,7 @@ UNUSUAL = {
     "amplifier_slew_limit_settling": {"S": 2e3},
     "rate_dependent_hysteresis_lagged": {"tau": 3e-4},
     "amplifier_saturation": {"lower": 1.4, "upper": 4.4},
+    "hysteresis_memory": {"virgin": 1.0, "turns": (0.6, 0.1)},
 }
 """Sizes of effects that are not off at a finite small value."""
 

@@ -47,17 +47,18 @@ from piezo_hysteresis.effects import (
 )
 from piezo_hysteresis.errors import DivergenceError, ModelError, ParameterError
 from piezo_hysteresis.model.model import Model
-from piezo_hysteresis.parameter import Parameter
+from piezo_hysteresis.parameter import Parameter, Value
 
 PERIOD = 2e-5
 N = 1500
 WORST = 1e9
 """Largest growth of rounding in the dynamics at which a path still says something."""
-TYPICAL: dict[str, dict[str, float]] = {
+TYPICAL: dict[str, dict[str, Value]] = {
     "amplifier_slew_limit": {"S": 1e5},
     "amplifier_slew_limit_held": {"S": 1e5},
     "amplifier_slew_limit_settling": {"S": 1e5, "tau": 1e-5},
     "amplifier_saturation": {"lower": -3.0, "upper": 4.4, "corner": 0.5},
+    "hysteresis_memory": {"virgin": 1.0, "turns": (0.6, 0.1)},
     "rate_dependent_hysteresis": {"k": 0.01, "a": 0.1},
     "rate_dependent_hysteresis_lagged": {"k": 0.01, "a": 0.1, "tau": 2e-4},
     "arx": {},

@@ -14,6 +14,7 @@
 
 """Records of a step and growing sines, without noise phases: the best model that is known is the least delivered."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +26,7 @@ from piezo_hysteresis.discrepancy import Conclusion, Verdict, diagnose
 from piezo_hysteresis.discrepancy.gap import Gap, PhaseGap
 from piezo_hysteresis.discrepancy.search.selection_result import Selection
 from piezo_hysteresis.discrepancy.verdict import CHOSEN, KEPT, REFITTED, conclusion_of_few
-from piezo_hysteresis.effects import Arx, Backlash, BoucWen, Creep, Effect, ThermalDrift
+from piezo_hysteresis.effects import Arx, Backlash, BoucWen, Creep, Effect, InitialState, ThermalDrift
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.free_run_error import errors
@@ -97,9 +98,9 @@ def test_a_truncated_record_is_diagnosed_after_its_first_full_loop():
     assert found.gap.after < 0.2
 
 
-def sines(*frequencies: float, samples: int = 4000, hidden: Effect | None = None) -> list[Record]:
-    """Sines without a step, of a stage of the published form and one more effect."""
-    chain = (BoucWen(), Arx(a=(-0.5,), b=(0.5,), delay=1.0), *([] if hidden is None else [hidden]))
+def sines(*frequencies: float, samples: int = 4000, hidden: Sequence[Effect] = ()) -> list[Record]:
+    """Sines without a step, of a stage of the published form and further effects."""
+    chain = (BoucWen(), Arx(a=(-0.5,), b=(0.5,), delay=1.0), *hidden)
     stage, rng = Model(chain, SLOW_PERIOD, 10.0, 1e-5), np.random.default_rng(0)
     time = SLOW_PERIOD * np.arange(samples)
     drives = [5.0 - 4.0 * np.cos(2.0 * np.pi * f * time) for f in frequencies]
@@ -114,7 +115,7 @@ def sines(*frequencies: float, samples: int = 4000, hidden: Effect | None = None
 
 @pytest.fixture(scope="module")
 def creeping() -> list[Record]:
-    return sines(0.25, 0.5, 5.0, 20.0, samples=8000, hidden=Creep(gamma=0.1))
+    return sines(0.25, 0.5, 5.0, 20.0, samples=8000, hidden=[Creep(gamma=0.1)])
 
 
 def test_creep_beside_the_published_loop_is_named(creeping):
@@ -123,6 +124,15 @@ def test_creep_beside_the_published_loop_is_named(creeping):
     assert found.names == ("creep",)
     assert found.gap.after < 0.1 * found.gap.before
     assert not any("creep" in n.message for n in found.experiment.notices if n.kind == "not_tested")
+
+
+def test_an_initial_state_beside_creep_is_named():
+    """Beside the wrong state at rest, the operator describes a creeping stage no better than plays do."""
+    found = diagnose(sines(0.5, 5.0, 20.0, hidden=[InitialState(h0=-0.05), Creep(gamma=0.01)]))
+    assert found.names == ("initial_state", "creep")
+    low, high = found.selection.accepted[0].best.fit.interval("initial_state.h0")
+    assert low < high < 0.0
+    assert found.gap.after < 1.1 * found.gap.floor
 
 
 def test_a_mode_beside_a_delay_has_its_own_frequency_and_damping():
@@ -161,12 +171,12 @@ def test_the_time_limit_ends_the_choice_of_a_structure(creeping):
     found = diagnose(creeping, time_limit=1e-6, progress=lambda word, part: words.append(word))
     assert found.conclusion is Conclusion.TIME_LIMIT and not found.names
     assert found.model is not None and found.gap is not None
-    assert "gap" in words and "structure: effects" not in words
+    assert "gap" in words and "structure: rival" not in words
 
 
 def test_a_long_record_is_judged_like_the_same_data_recorded_at_the_rate_of_its_averages():
     """Averages have less noise; with the floor of the single samples, V was 0.17 and nothing seemed to be missing."""
-    (long,) = sines(0.1, samples=200_000, hidden=Creep(gamma=0.01))
+    (long,) = sines(0.1, samples=200_000, hidden=[Creep(gamma=0.01)])
     noisy = replace(long, displacement=long.displacement + 1e-7 * np.random.default_rng(1).normal(size=long.size))
     given = Model((BoucWen(), Arx(a=(-0.5,), b=(0.5,), delay=1.0)), SLOW_PERIOD, 10.0, 1e-5)
     fast, slow = (diagnose(r, given, effects=()).selection for r in (noisy, noisy.decimate(10)))
@@ -175,14 +185,14 @@ def test_a_long_record_is_judged_like_the_same_data_recorded_at_the_rate_of_its_
 
 
 def test_one_rate_and_one_amplitude_get_no_name():
-    found = diagnose(sines(*[1.0] * 5, hidden=Backlash(b=0.15)))
+    found = diagnose(sines(*[1.0] * 5, hidden=[Backlash(b=0.15)]))
     assert found.conclusion is Conclusion.INSUFFICIENT_DATA
     assert "5 records of one rate and amplitude" in found.reason
 
 
 def test_an_error_of_the_published_model_on_test_records_is_not_nothing_missing():
     """The structure that is chosen may describe them, but it is not the published model."""
-    found = diagnose(sines(*[1.0] * 5, hidden=ThermalDrift(D=3e-7, tau=30.0)))
+    found = diagnose(sines(*[1.0] * 5, hidden=[ThermalDrift(D=3e-7, tau=30.0)]))
     assert found.gap.before > 2.0 * found.gap.floor
     assert found.conclusion is Conclusion.INSUFFICIENT_DATA
 

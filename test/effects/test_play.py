@@ -73,6 +73,16 @@ def test_a_closed_minor_loop_returns_to_the_point_where_it_left(
     np.testing.assert_allclose(y[-2], y[-4], atol=1e-14)
 
 
+@given(st.lists(st.floats(-1.0, 1.0), max_size=4), st.floats(-1.0, 1.0))
+def test_a_stage_that_was_driven_before_rests_in_the_state_of_that_drive(turns: list[float], v: float) -> None:
+    plays = HysteresisMemory(c=(0.3, 0.1, 0.2), reach=0.4, virgin=1.0)
+    block = plays.block(SETTING)
+    _, state = block.run(np.array([*turns, v]), block.rest(0.0, 0.0))
+    driven = plays.with_values(turns=tuple(turns)).block(SETTING)
+    np.testing.assert_allclose(driven.rest(v, 0.0), state, atol=1e-15)
+    assert driven.static(v) == pytest.approx(plays.array("c") @ state)
+
+
 def test_one_play_is_refused() -> None:
     with pytest.raises(ParameterError, match="expected at least 2"):
         HysteresisMemory(c=[0.1])

@@ -24,8 +24,8 @@ from piezo_hysteresis.effects import Arx, BoucWen, Creep, CreepTwoRates, ExtraRe
 from piezo_hysteresis.identification.fit.normal_equations import Nuisance
 from piezo_hysteresis.identification.free_run_error import errors
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.left_out import score_left_out
 from piezo_hysteresis.identification.steps.remaining_lag import lag
-from piezo_hysteresis.identification.structure.left_out import score_left_out
 from piezo_hysteresis.identification.structure.piece_fit import PieceFit, best_step, fit_pieces, linearised
 from piezo_hysteresis.identification.structure.pieces import Kind, pieces_of
 from piezo_hysteresis.identification.structure.prior import WANDER, WANDER_TIME

@@ -22,13 +22,13 @@ from functools import reduce
 
 import numpy as np
 
-from ...effects import MEMORY, Creep, CreepTwoRates, EvenInputPolynomial, ExtraResonance, ThermalDrift
+from ...effects import HYSTERESIS, MEMORY, Creep, CreepTwoRates, EvenInputPolynomial, ExtraResonance, ThermalDrift
 from ...errors import PiezoError
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit
 from ...identification.identification import Identification
+from ...identification.left_out import score_left_out
 from ...identification.steps.remaining_lag import AMPLIFIERS
-from ...identification.structure.left_out import score_left_out
 from ...identification.structure.piece_fit import DELAY
 from ...identification.structure.pieces import pieces_of
 from ...identification.structure.pole_place import with_pole_behind
@@ -45,6 +45,7 @@ POLES = tuple(form.name for form in AMPLIFIERS)
 """Forms of a pole before the hysteresis."""
 ORDER = (
     MEMORY.name,
+    *(term.name for term in (HYSTERESIS.start_term,) if term is not None),
     ExtraResonance.name,
     Creep.name,
     CreepTwoRates.name,

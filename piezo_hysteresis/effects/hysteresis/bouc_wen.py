@@ -40,6 +40,7 @@ from ...inverse_terms import GENERAL, PLAIN, InverseStart, InverseTerms, LoopTer
 from ...parameter import Parameter
 from ..effect import Discretisation, Effect
 from ..invertibility import Invertibility
+from .initial_state import InitialState
 from .operator import HysteresisOperator, Loop
 
 MODIFIED_BOUC_WEN = (
@@ -118,8 +119,7 @@ class ModifiedBoucWen(HysteresisOperator):
         from .bouc_wen_start import closest_loop  # imports scipy.optimize, which would delay the start of nodes
 
         # a drive with two levels hardly determines the loop, whose height can then be any number
-        rows = {p.name: p for p in self.parameters}
-        found = closest_loop(loops).items()
+        found, rows = closest_loop(loops).items(), {p.name: p for p in self.parameters}
         return self.with_values(**{n: min(max(v, rows[n].lower), rows[n].upper) for n, v in found})
 
 
@@ -155,6 +155,7 @@ class BoucWen(ModifiedBoucWen):
     signature = "The loops do not depend on rate. They have one memory state, which saturates at |A|/(β + γ sgn A)"
     source = "paper, Eq. (2), (3), (6); exact step for n = 1"
     parameters = MODIFIED_BOUC_WEN
+    start_term = InitialState
 
     def memoryless(self) -> Self:
         return type(self)(A=0.0, gamma=0.0, p1=self["p1"], p2=self["p2"])

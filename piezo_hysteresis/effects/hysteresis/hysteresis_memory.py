@@ -30,7 +30,7 @@ from ..effect import ChainPosition, Discretisation, Effect, Term
 from ..excitation_need import ExcitationNeed
 from ..extent import Extent
 from ..invertibility import Invertibility
-from .level_dependent_memory import LevelDependentMemory, LevelDependentMemoryBlock, PlaysBlock, plays_in_c
+from .level_dependent_memory import LevelDependentMemory, LevelDependentMemoryBlock, PlaysBlock
 from .play import play_positions, play_slopes
 
 SPAN = 32.0
@@ -49,6 +49,8 @@ class HysteresisMemory(Effect):
         Half width of the widest play [normalised, 1]; all plays move if it is below half the drive range.
     virgin : float
         State at rest [1]: at 0 every play is centred, at 1 every play is in the state after a ramp from 0 V.
+    turns : sequence of float
+        Turning points of the drive [normalised, 1] on its way from 0 V to the rest, if the ramp was not direct.
 
     Notes
     -----
@@ -88,6 +90,18 @@ class HysteresisMemory(Effect):
         Parameter(
             "virgin", "f_0", "1", 0.0, 0.0, 1.0, "state at rest: 0 relaxed, 1 reached from 0 V", "Gu 2016", fixed=True
         ),
+        Parameter(
+            "turns",
+            "v_t",
+            "1",
+            (),
+            -10.0,
+            10.0,
+            "turning points of the drive before the rest",
+            "Gu 2016",
+            fixed=True,
+            powers=(1, 0),
+        ),
     )
 
     @classmethod
@@ -112,12 +126,21 @@ class HysteresisMemory(Effect):
         """Half widths of the plays [normalised], shape (any,)."""
         return self["reach"] * SPAN ** np.linspace(-1.0, 0.0, self.array("c").size)
 
+    @property
+    def before(self) -> Array:
+        """Plays [normalised] at the last of `turns`, and 0 without turning points, shape (any,)."""
+        plays = np.zeros_like(self.radii)
+        for turn in self.array("turns"):
+            plays = np.clip(plays, turn - self.radii, turn + self.radii)
+        return plays
+
     def block(self, setting: Discretisation, terms: tuple[Effect, ...] = ()) -> Block:
+        plays = self.array("c"), self.radii, self["virgin"], self.before
         names = tuple(f"hysteresis_memory.c[{j}]" for j in range(self.array("c").size))
         if terms:
             names += tuple(f"{terms[0].name}.{p.name}" for p in terms[0].parameters if not p.fixed)
-            return LevelDependentMemoryBlock(names, self.array("c"), self.radii, self["virgin"], terms[0])
-        return HysteresisMemoryBlock(names, self.array("c"), self.radii, self["virgin"])
+            return LevelDependentMemoryBlock(names, *plays, terms[0])
+        return HysteresisMemoryBlock(names, *plays)
 
 
 @kernel
@@ -174,7 +197,7 @@ class HysteresisMemoryBlock(PlaysBlock):
         return y, rows, state, tangent
 
     def c_form(self) -> CForm:
-        return plays_in_c("p", self.c, self.radii, self.virgin)
+        return self.plays_in_c("p")
 
     def inverse_terms(self) -> InverseTerms:
-        return InverseTerms(plays=PlayTerms(self.c, self.radii, self.virgin))
+        return InverseTerms(plays=PlayTerms(self.c, self.radii, self.virgin, self.before))

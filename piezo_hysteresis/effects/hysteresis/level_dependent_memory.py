@@ -119,7 +119,7 @@ REST = """\
 double total = 0.0;
 int j;
 for (j = 0; j < PLAYS; j++) {
-    const double p = s->p[j] = x - virgin * smaller(larger(x, -radius[j]), radius[j]);
+    const double p = s->p[j] = x - virgin * smaller(larger(x - earlier[j], -radius[j]), radius[j]);
     total += c[j] * VALUE;
 }
 return total;
@@ -137,13 +137,6 @@ return total;
 """C code of plays for one sample."""
 
 
-def plays_in_c(value: str, c: Array, radii: Array, virgin: float, library: str = "", **numbers: Number) -> CForm:
-    """C code of Σ c_j value(p_j), from a C expression in p."""
-    constants: dict[str, Number] = {"PLAYS": c.size, "c": c, "radius": radii, "virgin": virgin, **numbers}
-    step, rest = (code.replace("VALUE", value) for code in (STEP, REST))
-    return CForm(step, rest, constants, (f"double p[{c.size}]",), (library,) if library else ())
-
-
 class PlaysBlock(Block):
     """A sum over plays p_j of one input; state p (s,).
 
@@ -154,19 +147,24 @@ class PlaysBlock(Block):
     c, radii : (s,) ndarray
         Weights and half widths of the plays.
     virgin : float
-        State at rest: 0 for centred plays, 1 for the state after a ramp from 0 V.
+        State at rest: 0 for centred plays, 1 for the state after the drive before the rest.
+    before : (s,) ndarray or None
+        Plays before the drive came to the rest; None for plays at 0.
     """
 
     keeps_state = True
 
-    def __init__(self, names: tuple[str, ...], c: Array, radii: Array, virgin: float) -> None:
+    def __init__(
+        self, names: tuple[str, ...], c: Array, radii: Array, virgin: float, before: Array | None = None
+    ) -> None:
         self.names, self.c, self.radii, self.virgin = names, c, radii, virgin
+        self.before = np.zeros_like(radii) if before is None else before
 
     def rest(self, x0: float, time: float) -> State:
-        return x0 - self.virgin * np.clip(x0, -self.radii, self.radii)
+        return x0 - self.virgin * np.clip(x0 - self.before, -self.radii, self.radii)
 
     def _rest_slopes(self, x0: float) -> Array:
-        return np.asarray(1.0 - self.virgin * (abs(x0) < self.radii))
+        return np.asarray(1.0 - self.virgin * (abs(x0 - self.before) < self.radii))
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
         return np.outer(dx0, self._rest_slopes(x0))
@@ -174,20 +172,29 @@ class PlaysBlock(Block):
     def inverse_start(self, x: float, state: State) -> InverseStart:
         return InverseStart(plays=state)
 
+    def plays_in_c(self, value: str, library: str = "", **numbers: Number) -> CForm:
+        """C code of Σ c_j value(p_j), from a C expression in p."""
+        constants: dict[str, Number] = {"PLAYS": self.c.size, "c": self.c, "radius": self.radii, **numbers}
+        constants |= {"virgin": self.virgin, "earlier": self.before}
+        step, rest = (code.replace("VALUE", value) for code in (STEP, REST))
+        return CForm(step, rest, constants, (f"double p[{self.c.size}]",), (library,) if library else ())
+
 
 class LevelDependentMemoryBlock(PlaysBlock):
     """Σ c_j f_j(p_j); state p (s,).
 
     Parameters
     ----------
-    names, c, radii, virgin
+    names, c, radii, virgin, before
         As for `PlaysBlock`; the names of k_1, k_n and q follow those of the weights.
     term : LevelDependentMemory
         The dependence on the level.
     """
 
-    def __init__(self, names: tuple[str, ...], c: Array, radii: Array, virgin: float, term: Effect) -> None:
-        super().__init__(names, c, radii, virgin)
+    def __init__(
+        self, names: tuple[str, ...], c: Array, radii: Array, virgin: float, before: Array, term: Effect
+    ) -> None:
+        super().__init__(names, c, radii, virgin, before)
         self.middle, self.q = term["middle"], term["curvature"]
         k = np.linspace(term["slope_narrow"], term["slope_wide"], c.size)
         self.a, self.b = 1.0 - self.middle * (k - self.q * self.middle), k - 2.0 * self.q * self.middle
@@ -216,9 +223,8 @@ class LevelDependentMemoryBlock(PlaysBlock):
         return y, rows, state, tangent
 
     def c_form(self) -> CForm:
-        call, own = "level_value(p, a[j], b[j], q)", (self.c, self.radii, self.virgin)
-        return plays_in_c(call, *own, VALUE_IN_C, a=self.a, b=self.b, q=self.q)
+        return self.plays_in_c("level_value(p, a[j], b[j], q)", VALUE_IN_C, a=self.a, b=self.b, q=self.q)
 
     def inverse_terms(self) -> InverseTerms:
         root = np.vstack((self.a, self.b, np.full(self.a.size, self.q)))
-        return InverseTerms(plays=PlayTerms(self.c, self.radii, self.virgin, root))
+        return InverseTerms(plays=PlayTerms(self.c, self.radii, self.virgin, self.before, root))

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from ...blocks.block import Array
 from ...errors import IdentificationError
-from ..effect import ChainPosition, Discretisation, Effect
+from ..effect import ChainPosition, Discretisation, Effect, Term
 
 POINTS = 6000
 """Approximate number of points of the data for a search of start values."""
@@ -71,6 +71,8 @@ class HysteresisOperator(Effect):
     """Parameters to which w is proportional: w doubles if all of them are doubled."""
     memory_names: ClassVar[tuple[str, ...]] = ()
     """Parameters that have no meaning if the memory is switched off."""
+    start_term: ClassVar[type[Term] | None] = None
+    """Term for the state at rest of a stage that was driven before; None if there is none."""
 
     def fitted_names(self) -> tuple[str, ...]:
         """Names of the numbers that a fit adjusts: ``"beta"``, or ``"c[0]"`` for elements of an array parameter."""

@@ -48,6 +48,7 @@ from .piece_fit import PieceFit
 from .pieces import Kind, RecordPiece, pieces_of
 from .pole_place import FitLinearPart
 from .scores import STRUCTURES, TIE, Judged, ModelStructure, Ranking
+from .state_at_rest import Described, in_state_at_rest, lead_of_state, rest_notices
 from .step_weights import discounted_steps
 from .structure_fit import fit_structure
 from .uncertainty import as_fit, spread_of
@@ -85,7 +86,7 @@ class StructureChoice:
         For every optional effect, the score (mean ln R²) of the best structure without it minus the score of the chosen
         one, if there are structures without it; both have the chosen kind of hysteresis.
     notices : tuple of Notice
-        ``structure``, ``memory``, ``ringing``, ``step_edge``, ``amplifier``, ``step_time``.
+        ``structure``, ``memory``, ``state_at_rest``, ``ringing``, ``step_edge``, ``amplifier``, ``step_time``.
     """
 
     fit: Fit
@@ -126,33 +127,42 @@ def choose_structure(
     used, sizes = [records[i] for i in kept], [floors[i] for i in kept]
     pieces = pieces_of(used, [k for k, i in enumerate(kept) if i in fitted])
     progress("structure: lag", 0.1)
+
+    def with_plays(model: Model) -> Described:
+        linear, described = fit_linear(model, pieces, sizes), pieces
+        full = linear.fit
+        for _ in range(DISCOUNTS):
+            described = discounted_steps(described, full)
+            if all(p.share == 1.0 for p in described):
+                break
+            full = fit_structure(full.model, described, sizes, held_by(full))
+        return Described(linear, full, described)
+
     begun = _with_plays(start, used)
-    linear = fit_linear(begun, pieces, sizes)
-    full = linear.fit
-    progress("structure: effects", 0.4)
-    held = held_by(full)
-    for _ in range(DISCOUNTS):
-        pieces = discounted_steps(pieces, full)
-        if all(p.share == 1.0 for p in pieces):
-            break
-        full = fit_structure(full.model, pieces, sizes, held)
+    plays = in_state_at_rest(begun, with_plays, used, sizes)
+    linear, full, weighted, held = plays.linear, plays.fit, plays.pieces, held_by(plays.linear.fit)
     progress("structure: rival", 0.6)
 
-    def fit_operator() -> PieceFit:
+    def with_operator(model: Model) -> Described:
         if behind_operator is None:
-            return fit_structure(_with_operator(full.model, start), pieces, sizes, held)
-        return behind_operator(_with_operator(begun, start), pieces, sizes).fit
+            return Described(linear, fit_structure(model, weighted, sizes, held), weighted)
+        behind = behind_operator(model, weighted, sizes)
+        return Described(behind, behind.fit, weighted)
 
-    ranking, lead = _with_plays_or_operator(full, fit_operator, pieces)
+    def fit_operator() -> PieceFit:
+        operator = _with_operator(begun if behind_operator else full.model, start)
+        return in_state_at_rest(operator, with_operator, used, sizes).fit
+
+    ranking, lead = _with_plays_or_operator(full, fit_operator, weighted)
     progress("structure: fit", 0.8)
     chosen, judged = ranking.chosen, ranking.judged
-    final = fit_structure(_reduced(ranking.full.model, chosen), pieces, sizes, held)
+    final = fit_structure(_reduced(ranking.full.model, chosen), weighted, sizes, held)
     message = (
         f"by prediction of rates, amplitudes and records left out, {ranking.words(chosen)} was chosen"
         f"{'' if chosen is judged[0] else SIMPLER}; prediction errors in units of the noise floor: {ranking.described}"
     )
-    notices = [*linear.notices(final), Notice("structure", message)]
-    leads = {**linear.leads, **_leads(chosen, judged)}
+    notices = [*linear.notices(final), *rest_notices(final.model), Notice("structure", message)]
+    leads = {**linear.leads, **lead_of_state(final, weighted, sizes), **_leads(chosen, judged)}
     if MEMORY.name not in final.model:
         message = f"predicts data left out better than the plays by a factor of {np.exp(0.5 * lead):.3g}"
         message = f"{start.hysteresis.name} {message}, so it takes their place"
@@ -162,7 +172,7 @@ def choose_structure(
         if not final.model[MEMORY.name].array("c").any():
             message = "no hysteresis was found: the weights of all plays are 0"
     notices.append(Notice("memory", message))
-    fit = as_fit(final, pieces, sizes, spread_of(ranking.full, final, chosen, judged), linear.open_lag)
+    fit = as_fit(final, weighted, sizes, spread_of(ranking.full, final, chosen, judged), linear.open_lag)
     return StructureChoice(fit, judged, leads, tuple(notices))
 
 

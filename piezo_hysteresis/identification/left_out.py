@@ -18,12 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from ...model.model import Model
-from ...record import Record
-from .piece_fit import PieceFit, linearised
-from .pieces import Kind, pieces_of
-from .scores import ModelStructure, judge
-from .structure_fit import free_numbers
+from ..model.model import Model
+from ..record import Record
+from .structure.piece_fit import PieceFit, linearised
+from .structure.pieces import Kind, pieces_of
+from .structure.scores import ModelStructure, judge
+from .structure.structure_fit import free_numbers
 
 WHOLE = ModelStructure(True, 2, True)
 """The structure with all effects switched on."""

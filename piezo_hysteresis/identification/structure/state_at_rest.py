@@ -1,0 +1,140 @@
+# Copyright 2026 piezo_hysteresis maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The state at rest in which the records begin: that after a ramp from 0 V, or after a full loop of the drive.
+
+A stage that was driven before remembers it: at the same voltage its displacement is another one, and its first rise is
+as wide as that of a loop. No record may show by which drive. But plays in the state after a full loop, or an operator
+that begins at a state of its own, describe the first rise and the loops after it together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...effects import MEMORY
+from ...model.model import Model
+from ...record import Notice, Record
+from .mode import held_by
+from .piece_fit import PieceFit, best_step, linearised
+from .pieces import RecordPiece
+from .pole_place import LinearPart
+from .structure_fit import fit_structure
+
+PROMISES = 0.9
+"""Largest share of the cost after one step in another state from which this state is fitted."""
+CLEARLY = 0.7
+"""Largest share of the cost that another state leaves; otherwise the stage counts as not driven before the records."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Described:
+    """Pieces described by a model with a linear part.
+
+    Parameters
+    ----------
+    linear : LinearPart
+        The linear part.
+    fit : PieceFit
+        The fit of all numbers beside it.
+    pieces : sequence of RecordPiece
+        The pieces with the weights of that fit.
+    """
+
+    linear: LinearPart
+    fit: PieceFit
+    pieces: Sequence[RecordPiece]
+
+
+def in_state_at_rest(
+    begun: Model, describe: Callable[[Model], Described], records: Sequence[Record], floors: Sequence[float]
+) -> Described:
+    """Describe the records by a model in the state at rest that suits them.
+
+    Parameters
+    ----------
+    begun : Model
+        Model of a stage that was not driven before.
+    describe : callable
+        Fits a model from its start values.
+    records : sequence of Record
+        The experiment, in order.
+    floors : sequence of float
+        Floor of every record [m].
+    """
+    found = describe(begun)
+    held, models = held_by(found.fit), _driven_before(found.fit.model, records)
+    costs = [_cost_after_step(fit_structure(model, found.pieces, floors, held, 1)) for model in models]
+    if not min(costs, default=np.inf) < PROMISES * found.fit.cost:
+        return found
+    best = int(np.argmin(costs))
+    further = replace(found, fit=fit_structure(models[best], found.pieces, floors, held))
+    # what was fitted beside the wrong state describes a part of the difference
+    anew = describe(_driven_before(begun, records)[best])
+    cost, other = min((_cost_with(found.pieces, d.fit, floors), k) for k, d in enumerate((further, anew)))
+    return (further, anew)[other] if cost < CLEARLY * found.fit.cost else found
+
+
+def rest_notices(model: Model) -> list[Notice]:
+    """``state_at_rest`` if the stage was driven before the records."""
+    term = model.hysteresis.start_term
+    if term is not None and term.name in model:
+        h0 = ", ".join(f"{value:.3g}" for value in model[term.name].free_values())
+        where = f"the state of {model.hysteresis.name} is {h0}"
+    elif MEMORY.name in model and (turns := model[MEMORY.name].array("turns")).size:
+        where = f"its plays are as after {' and '.join(f'{model.voltage_scale * v:.4g} V' for v in turns)}"
+    else:
+        return []
+    return [Notice("state_at_rest", f"the stage was driven before the records: at rest, {where}")]
+
+
+def lead_of_state(fit: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> dict[str, float]:
+    """ln of the factor by which the state of an operator at rest lowers the cost, by the name of the effect."""
+    term = fit.model.hysteresis.start_term
+    if term is None or term.name not in fit.model:
+        return {}
+    without = fit_structure(fit.model.without(term.name), pieces, floors, held_by(fit))
+    return {term.name: float(np.log(without.cost / fit.cost))}
+
+
+def _driven_before(model: Model, records: Sequence[Record]) -> list[Model]:
+    """The model in every other state at rest at which the records may begin."""
+    if MEMORY.name not in model:
+        term = model.hysteresis.start_term
+        return [model.with_effect(term())] if term is not None else []
+    plays, u = model.effect(MEMORY), [np.append(r.voltage, r.settled_voltage) for r in records]
+    low, high = (float(end) / model.voltage_scale for end in (min(map(np.min, u)), max(map(np.max, u))))
+    near, far = (records[0].settled_voltage / model.voltage_scale + side * plays.radii for side in (-1.0, 1.0))
+    states, found = [np.clip(0.0, near, far)], []
+    for turns in ((high, low), (low, high)):
+        driven = plays.with_values(turns=turns)
+        state = np.clip(driven.before, near, far)
+        if not any(np.array_equal(state, other) for other in states):
+            states.append(state)
+            found.append(model.with_effect(driven))
+    return found
+
+
+def _cost_with(pieces: Sequence[RecordPiece], fit: PieceFit, floors: Sequence[float]) -> float:
+    """Cost of a fit with the weights of these pieces."""
+    return PieceFit(fit.model, (), *linearised(fit.model, pieces, floors, ())).cost
+
+
+def _cost_after_step(fit: PieceFit) -> float:
+    """Cost after the best step, to first order."""
+    step = best_step(fit, fit.total)
+    return float(fit.total[-1, -1] - 2.0 * step @ fit.total[:-1, -1] + step @ fit.total[:-1, :-1] @ step)
