@@ -107,8 +107,9 @@ class HysteresisMemory(Effect):
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
         half = extent.span / (2.0 * extent.voltage_scale)
-        farthest = max(abs(extent.voltage_min), abs(extent.voltage_max)) / extent.voltage_scale
-        return cls(reach=half), cls(reach=max(half, farthest), virgin=1.0)
+        low, high = extent.voltage_min / extent.voltage_scale, extent.voltage_max / extent.voltage_scale
+        at_rest = cls(reach=max(half, abs(low), abs(high)), virgin=1.0)
+        return cls(reach=half), at_rest, at_rest.with_values(turns=(high, low))
 
     def refined(self) -> Self:
         """The same effect with an additional play of zero weight between every two plays."""
