@@ -79,11 +79,16 @@ def free_run_error(model: Model) -> float | None:
 
 
 def parameter_error(model: Model, voltage: Array, along: slice) -> float | None:
-    """Standard error of the displacement from the covariance of the parameters [m], as RMS over a part of a drive [V].
+    """Standard error of the displacement since the rest before a drive [V], as RMS over a part of the drive [m].
 
-    None if the model has no covariance.
+    It follows from the covariance of the parameters; None if the model has none. The displacement at rest itself is not
+    part of it, because the zero of the sensor is measured there.
     """
-    if model.covariance is None:
+    known = model.covariance
+    if known is None:
         return None
-    (found,) = model.standard_errors([Record(voltage, np.zeros_like(voltage), model.sample_period)])
+    record, found, rest = Record(voltage, np.zeros_like(voltage), model.sample_period), np.empty(voltage.size), None
+    for _, part, _, names, slopes in model.linearise([record], known.names):
+        rest = slopes[:, :1].copy() if rest is None else rest
+        found[part] = known.errors_with(names, slopes - rest)
     return float(np.sqrt(np.mean(found[along] ** 2)))

@@ -128,11 +128,11 @@ def standard_errors(model: Model, records: Iterable[Record]) -> list[Array]:
         )
     records = list(records)
     found = [np.empty(record.size) for record in records]
-    matrix, place = known.matrix, {name: k for k, name in enumerate(known.names)}
+    means = [np.zeros((1, 1)) for _ in records]
+    for index, _, _, _, slopes in model.linearise(records, known.names):
+        means[index] = means[index] + slopes.sum(axis=1, keepdims=True) / records[index].size
     for index, part, _, names, slopes in model.linearise(records, known.names):
-        at = [place[name] for name in names]
-        variance = np.einsum("ki,kl,li->i", slopes, matrix[np.ix_(at, at)], slopes, optimize=True)
-        found[index][part] = np.sqrt(np.maximum(variance, 0.0))
+        found[index][part] = known.errors_with(names, slopes - means[index])
     return found
 
 

@@ -94,6 +94,12 @@ class ParameterCovariance:
         rows = np.array(self.factor).reshape(len(self.names), -1)
         return np.asarray(rows @ rows.T)
 
+    def errors_with(self, names: Sequence[str], slopes: Array) -> Array:
+        """Standard errors (k,) of quantities with these slopes (q, k) with numbers of the model."""
+        at = [self.names.index(name) for name in names]
+        variance = np.einsum("ki,kl,li->i", slopes, self.matrix[np.ix_(at, at)], slopes, optimize=True)
+        return np.sqrt(np.maximum(variance, 0.0))
+
 
 def response_error(model: Model, names: Sequence[str], covariance: Array, frequency: Array) -> Array:
     """Relative standard error of the response of the linear dynamics, shape (k,).

@@ -21,12 +21,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.other_forms import KINDS, random_stage
+from benchmarks.prediction import fitted_drives, measured
 from piezo_hysteresis.compensation import Limits, plan, reachable
 from piezo_hysteresis.compensation.expected_error import free_run_error, parameter_error
 from piezo_hysteresis.effects import AmplifierSaturation, AmplifierSlewLimit, Arx, BoucWen, Creep, Effect
 from piezo_hysteresis.effects.drive.amplifier_slew_limit_settling import AmplifierSlewLimitSettling
 from piezo_hysteresis.errors import ModelError
+from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.model.parameter_covariance import ParameterCovariance
+from piezo_hysteresis.record import Experiment
 
 from .published import PERIOD, stage, swing, triangle
 
@@ -240,6 +244,22 @@ def test_stages_that_the_covariance_allows_miss_the_path_by_what_is_expected() -
         missed.append(np.mean((measured[found.begin : found.begin + y.size] - y) ** 2))
     assert found.expected.total == pytest.approx(np.sqrt(np.mean(missed)), rel=0.3)
     assert found.expected.total > 10.0 * 5e-9
+
+
+@pytest.mark.parametrize("kind", ["generalised plays", "Bouc-Wen, n = 1.6"])
+def test_a_stage_of_another_form_misses_the_path_by_about_what_is_expected(kind: str) -> None:
+    """The uncertainty of the displacement at rest, which the zero of the sensor contains, made it ten times as much."""
+    stage, drives = random_stage(KINDS[kind], 0), fitted_drives()
+    records = [measured(stage, phase, drives[phase]) for phase in ("triangle", "noise")]
+    model = identify(Experiment(records), memory=True).model
+    at = float(model.run(np.zeros(1), model.rest(0.0))[0][0])
+    time = np.arange(2000) * model.sample_period
+    y = at + 5e-6 - 3e-6 * np.cos(2.0 * np.pi * 3.0 * time) + 1e-6 * np.sin(2.0 * np.pi * 7.0 * time)
+    found = plan(model, y, UNIPOLAR, approach=0.2)
+    reached = measured(stage, "path", found.voltage / 10.0).displacement
+    missed = (reached - reached[:50].mean())[found.begin : found.begin + y.size] - (y - at)
+    assert found.expected.parameters is not None
+    assert 0.5 < found.expected.total / np.sqrt(np.mean(missed**2)) < 3.0
 
 
 def test_neither_the_way_to_the_path_nor_the_way_back_changes_the_expected_error() -> None:

@@ -163,10 +163,11 @@ def test_the_standard_error_is_the_spread_of_models_drawn_from_the_covariance() 
     first = Record(drive, np.zeros(400), 2e-5)
     records = [first, Record(drive, np.zeros(400), 2e-5, start_time=first.duration, continues=True)]
     middle = np.array([MODEL.values()[name] for name in names])
-    drawn = [
-        np.concatenate(MODEL.with_values(dict(zip(names, numbers, strict=True))).simulate(records))
+    models = [
+        MODEL.with_values(dict(zip(names, numbers, strict=True)))
         for numbers in middle + rng.normal(size=(800, 3)) @ root.T
     ]
+    drawn = [np.concatenate([y - y.mean() for y in model.simulate(records)]) for model in models]
     stated_errors = np.concatenate(stated.standard_errors(records))
     np.testing.assert_allclose(stated_errors, np.std(drawn, axis=0), rtol=0.1)
     with pytest.raises(ModelError, match="without the covariance"):
