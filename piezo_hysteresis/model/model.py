@@ -222,9 +222,9 @@ class Model(Composition):
     def standard_errors(self, records: Iterable[Record]) -> list[Array]:
         """Standard error (n,) [m] of the displacement of every record, from the covariance of the fitted numbers.
 
-        The mean of each record is left out, as in the errors of a model: the sensor zero is free, so no record
-        determines it. A prediction band of 95 % about `simulate` is ± 1.96 of it. It contains the uncertainty of the
-        fitted numbers to first order, but neither the noise of the sensor nor effects that the model does not have.
+        The mean of each record is left out, because the sensor zero is free. A prediction band of 95 % is `simulate` ±
+        1.96 of it. It contains the uncertainty of the fitted numbers to first order, but neither the noise of the
+        sensor nor effects that the model does not have.
 
         Raises
         ------
