@@ -27,9 +27,10 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from dataclasses import dataclass
 from queue import SimpleQueue
 from typing import Any, BinaryIO, TypeVar
 
@@ -41,41 +42,51 @@ from .one_core import on_one_core
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+Wanted = Callable[[Any], bool]
+
 MOST = 4
 """Largest number of cores that are used; loops of a diagnosis have about this number of long items."""
 
 
 class _Helpers:
-    """Helper processes, each served by a thread of `pool`, which waits until its process has started."""
+    """Helper processes, each served by a thread, which waits until its process has started.
+
+    No `ThreadPoolExecutor`: a Ctrl-C while it takes an item can leave one of its locks held, and its end then waits for
+    ever. Nothing waits for these threads, and a `SimpleQueue` has no such lock.
+    """
 
     def __init__(self, count: int) -> None:
         self._count = count
         self._processes: list[subprocess.Popen[bytes]] = []
-        self.pool: ThreadPoolExecutor | None = None
+        self._jobs: SimpleQueue[_Job | None] = SimpleQueue()
+
+    @property
+    def are_started(self) -> bool:
+        return bool(self._processes)
 
     def start(self) -> None:
-        if self._count < 1 or self.pool is not None:
+        if self.are_started:
             return
         command = [sys.executable, "-c", f"from {__name__} import serve; serve()"]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
         silent, pipe = subprocess.DEVNULL, subprocess.PIPE
-        starting: SimpleQueue[subprocess.Popen[bytes]] = SimpleQueue()
         for _ in range(self._count):
             # a session of its own, because Ctrl-C is meant for this process, which ends the helpers
             process = subprocess.Popen(
                 command, stdin=pipe, stdout=pipe, stderr=silent, env=environment, start_new_session=True
             )
             self._processes.append(process)
-            starting.put(process)
-        self.pool = ThreadPoolExecutor(self._count, "helper", _await_start, (starting,))
-        for _ in self._processes:
-            self.pool.submit(int)  # starts a thread
+            threading.Thread(target=_employ, args=(process, self._jobs), name="helper", daemon=True).start()
+
+    def submit(self, function: Callable[[Item], Result], item: Item, wanted: Wanted, end: float) -> Future[Result]:
+        future: Future[Any] = Future()
+        self._jobs.put(_Job(future, function, item, wanted, end))
+        return future
 
     def end(self) -> None:
         for process in self._processes:
             process.kill()
-        if self.pool is not None:
-            self.pool.shutdown(cancel_futures=True)
+            self._jobs.put(None)
         for process in self._processes:
             process.wait()
             for stream in (process.stdin, process.stdout):
@@ -85,8 +96,6 @@ class _Helpers:
 
 _HELPERS: ContextVar[_Helpers | None] = ContextVar("helpers of this diagnosis", default=None)
 """Helpers of the diagnosis that runs in this context."""
-_thread = threading.local()
-"""`process`: the helper that this thread serves."""
 
 
 @contextmanager
@@ -132,14 +141,13 @@ def on_cores(
         Whether an item is still computed, given the results so far; what is no longer wanted never becomes so again.
     """
     helpers = _HELPERS.get()
-    pool = helpers.pool if helpers is not None else None
-    if pool is None:
+    if helpers is None or not helpers.are_started:
         yield from ((item, function(item)) for item in items if wanted(item))
         return
     end = end_of_search()
     own: Future[Any] = Future()  # the first item decides what else is wanted, so it never waits for a helper
     own.cancel()
-    jobs = [own, *(pool.submit(_by_helper, function, item, wanted, end) for item in items[1:])]
+    jobs = [own, *(helpers.submit(function, item, wanted, end) for item in items[1:])]
     try:
         for k, item in enumerate(items):
             if not wanted(item):
@@ -180,19 +188,34 @@ def _result(job: Future[Result], function: Callable[[Item], Result], item: Item)
     return function(item)  # raises what the helper may have raised
 
 
-def _await_start(starting: SimpleQueue[subprocess.Popen[bytes]]) -> None:
-    process = starting.get()
-    _thread.process = process
+@dataclass(frozen=True, slots=True)
+class _Job:
+    """An item for a helper, the time at which its computation ends, and the future of its result."""
+
+    future: Future[Any]
+    function: Callable[[Any], Any]
+    item: Any
+    wanted: Wanted
+    end: float
+
+
+def _employ(process: subprocess.Popen[bytes], jobs: SimpleQueue[_Job | None]) -> None:
+    """Let a helper process compute one job after another, until it is None."""
     process.stdout.read(len(_READY))  # type: ignore[union-attr]
+    while (job := jobs.get()) is not None:
+        if job.future.set_running_or_notify_cancel():
+            try:
+                job.future.set_result(_by_helper(process, job))
+            except Exception as error:  # the item is computed again where its result is wanted
+                job.future.set_exception(error)
 
 
-def _by_helper(function: Callable[[Item], Result], item: Item, wanted: Callable[[Item], bool], end: float) -> Any:
-    """Send an item to the process of this thread and wait for its result."""
-    process = _thread.process
-    if not wanted(item):
+def _by_helper(process: subprocess.Popen[bytes], job: _Job) -> Any:
+    """Send an item to a helper process and wait for its result."""
+    if not job.wanted(job.item):
         raise CancelledError
-    _send(process.stdin, (function, item, end))
-    is_computed, result = pickle.loads(pickle.load(process.stdout))
+    _send(process.stdin, (job.function, job.item, job.end))  # type: ignore[arg-type]
+    is_computed, result = pickle.loads(pickle.load(process.stdout))  # type: ignore[arg-type]
     if not is_computed:
         raise CancelledError
     return result

@@ -223,8 +223,7 @@ class Model(Composition):
         """Standard error (n,) [m] of the displacement of every record, from the covariance of the fitted numbers.
 
         The mean of each record is left out, because the sensor zero is free. A prediction band of 95 % is `simulate` ±
-        1.96 of it. It contains the uncertainty of the fitted numbers to first order, but neither the noise of the
-        sensor nor effects that the model does not have.
+        1.96 of it, to first order, without the noise of the sensor and without effects that the model does not have.
 
         Raises
         ------

@@ -155,7 +155,10 @@ def test_no_helper_runs_after_its_parent(end):
         helper = int(parent.stdout.readline())
         assert runs(helper)
         parent.send_signal(end)
-        parent.wait(30.0)
+        try:
+            parent.wait(30.0)
+        finally:
+            parent.kill()
     late = time.monotonic() + 30.0
     while runs(helper) and time.monotonic() < late:
         time.sleep(0.02)

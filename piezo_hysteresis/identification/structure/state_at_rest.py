@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The state at rest in which the records begin: that after a ramp from 0 V, or after a full loop of the drive.
+"""The state at rest in which the records begin: that after a ramp from 0 V, or after a loop of the drive.
 
 A stage that was driven before remembers it: at the same voltage its displacement is another one, and its first rise is
-as wide as that of a loop. No record may show by which drive. But plays in the state after a full loop, or an operator
-that begins at a state of its own, describe the first rise and the loops after it together.
+as wide as that of a loop. No record may show by which drive. But plays in the state after a loop over the range or over
+half of it, or an operator that begins at a state of its own, describe the first rise and the loops after it together.
 """
 
 from __future__ import annotations
@@ -120,7 +120,8 @@ def _driven_before(model: Model, records: Sequence[Record]) -> list[Model]:
     low, high = (float(end) / model.voltage_scale for end in (min(map(np.min, u)), max(map(np.max, u))))
     near, far = (records[0].settled_voltage / model.voltage_scale + side * plays.radii for side in (-1.0, 1.0))
     states, found = [np.clip(0.0, near, far)], []
-    for turns in ((high, low), (low, high)):
+    half = 0.5 * (low + high)
+    for turns in ((high, low), (low, high), (half, low), (half, high)):
         driven = plays.with_values(turns=turns)
         state = np.clip(driven.before, near, far)
         if not any(np.array_equal(state, other) for other in states):
