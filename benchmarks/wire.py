@@ -99,6 +99,7 @@ class WiredSession:
         self.amplifier: Any = simulated if amplifier is None else amplifier
         self.deliveries, self.failures = [], []
         self.acquisition: Any = None
+        _SESSIONS.append(self)
 
     def start(self) -> None:
         self.acquisition = self.session.start(time.time_ns, self.deliveries.append, self.failures.append, lambda: 1)
@@ -144,9 +145,28 @@ class WiredSession:
             self.session.close()
 
 
+_SESSIONS: list[WiredSession] = []
+"""Sessions with the present device."""
+
+
 @contextmanager
 def device(word: str, **options) -> Iterator[tuple[str, dict, WireStage | None, object]]:
-    """Word of the back end, values of its parameters, the amplifier, and the emulated device."""
+    """Word of the back end, values of its parameters, the amplifier, and the emulated device.
+
+    An error ends the sessions with it: their files and threads would fail the next test, or a second try.
+    """
+    _SESSIONS.clear()
+    with _device(word, **options) as found:
+        try:
+            yield found
+        except BaseException:
+            for session in _SESSIONS:
+                session.end()
+            raise
+
+
+@contextmanager
+def _device(word: str, **options) -> Iterator[tuple[str, dict, WireStage | None, object]]:
     if word == "gcs2":
         amplifier = WireStage(seed=3)
         controller = Controller(amplifier, **{"serial": f"{time.monotonic_ns()}"} | options)  # a device of its own
