@@ -223,7 +223,7 @@ def _step(now: PieceFit, products: Products, damping: float, is_doubtful: bool) 
     moved = np.clip([values[n] for n in names] + step[: len(names)], *bounds_of(now.model, names))
     try:
         model = now.model.with_values(dict(zip(names, moved.tolist(), strict=True)))
-        if is_doubtful and not _cost(model, names, products) < now.cost:
+        if is_doubtful and not cost_of(model, names, products) < now.cost:
             return None
         matrices, weights = products(model, names)
     except (DivergenceError, ParameterError):
@@ -232,7 +232,7 @@ def _step(now: PieceFit, products: Products, damping: float, is_doubtful: bool) 
     return moved_there if moved_there.cost < now.cost else None
 
 
-def _cost(model: Model, names: Sequence[str], products: Products) -> float:
+def cost_of(model: Model, names: Sequence[str], products: Products) -> float:
     """Cost as in `PieceFit`, by a free run without slopes."""
     matrices, weights = products(model, ())
     own = PieceFit(model, (), matrices, weights)

@@ -30,7 +30,7 @@ from ...effects import MEMORY
 from ...model.model import Model
 from ...record import Notice, Record
 from .mode import held_by
-from .piece_fit import PieceFit, best_step, linearised
+from .piece_fit import PieceFit, best_step, cost_of, linearised
 from .pieces import RecordPiece
 from .pole_place import LinearPart
 from .structure_fit import fit_structure
@@ -85,8 +85,9 @@ def in_state_at_rest(
     further = replace(found, fit=fit_structure(models[best], found.pieces, floors, held))
     # what was fitted beside the wrong state describes a part of the difference
     anew = describe(_driven_before(begun, records)[best])
-    cost, other = min((_cost_with(found.pieces, d.fit, floors), k) for k, d in enumerate((further, anew)))
-    return (further, anew)[other] if cost < CLEARLY * found.fit.cost else found
+    cost = cost_of(anew.fit.model, anew.fit.names, lambda model, names: linearised(model, found.pieces, floors, names))
+    other = anew if cost < further.fit.cost else further
+    return other if min(cost, further.fit.cost) < CLEARLY * found.fit.cost else found
 
 
 def rest_notices(model: Model) -> list[Notice]:
@@ -128,11 +129,6 @@ def _driven_before(model: Model, records: Sequence[Record]) -> list[Model]:
             states.append(state)
             found.append(model.with_effect(driven))
     return found
-
-
-def _cost_with(pieces: Sequence[RecordPiece], fit: PieceFit, floors: Sequence[float]) -> float:
-    """Cost of a fit with the weights of these pieces."""
-    return PieceFit(fit.model, (), *linearised(fit.model, pieces, floors, ())).cost
 
 
 def _cost_after_step(fit: PieceFit) -> float:
