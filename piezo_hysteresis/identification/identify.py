@@ -56,6 +56,7 @@ from .records.one_axis import one_axis
 from .records.roles import HELD_OUT, Roles, roles_of
 from .steps.remaining_lag import lag
 from .steps.three_steps import behind_the_gauge
+from .structure.state_at_rest import begun_as_conditioned, rest_notices
 
 FEWEST_SAMPLES = 32
 """Number of samples of the shortest record that can show a loop."""
@@ -154,6 +155,10 @@ def identify(
     else:
         found = fit_loops(inputs)
     report("free run", 0.95)
+    begun = begun_as_conditioned(found.fit.model, found.records)
+    if begun is not found.fit.model:
+        notices += rest_notices(begun)
+        found = replace(found, fit=replace(found.fit, model=begun))
     joint = _with_zero(found)
     phases = phase_errors(found.fit.model, experiment, roles)
     notices += [*found.notices, *_fit_notices(joint, found, roles, phases)]

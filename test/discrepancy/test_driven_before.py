@@ -12,12 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Many records of a stage with plays that made a loop before each of them, which no record shows."""
+"""Stages that made a loop before the experiment, which no record shows."""
+
+from dataclasses import replace
 
 import numpy as np
 
 from piezo_hysteresis import Experiment, Record, diagnose
-from piezo_hysteresis.effects import Arx, BoucWen, HysteresisMemory
+from piezo_hysteresis.effects import AmplifierBandwidth, Arx, BoucWen, HysteresisMemory
 from piezo_hysteresis.model.model import Model
 
 PERIOD = 1e-3
@@ -39,6 +41,27 @@ def drives():
         "noise": 5.0 * fade * (1.0 + noise / np.abs(noise).max()),
         "step": np.repeat((0.0, 3.0, 8.0, 10.0, 4.0, 0.0), 500),
     }
+
+
+def measured(stage, before, records):
+    """The records, with what a stage does after the drive `before`, and noise."""
+    u = np.concatenate((before, *records.values()))
+    (y,) = stage.free_run([Record(u, np.zeros(u.size), PERIOD)])
+    y += 4e-9 * np.random.default_rng(0).normal(size=u.size)
+    parts = Record(u, y, PERIOD).split(*np.cumsum([before.size, *(u.size for u in records.values())][:-1]).tolist())[1:]
+    first, *later = (replace(part, phase=phase) for part, phase in zip(parts, records, strict=True))
+    return Experiment((replace(first, continues=False), *later))
+
+
+def test_a_named_model_begins_as_the_conditioning_shows():
+    """No other record depends on the state before it; the extended model predicts it down to the noise."""
+    stage = Model((BoucWen(), AmplifierBandwidth(tau=5e-3), Arx(a=(-0.5,), b=(0.5,), delay=1.0)), PERIOD, 10.0, 1e-5)
+    before = np.concatenate((triangle(10.0, 1.0), np.zeros(200)))
+    found = diagnose(measured(stage, before, {"conditioning": triangle(10.0, 1.0), **drives()}))
+    assert found.names == ("amplifier_bandwidth",)
+    first = found.experiment[0]
+    (predicted,) = found.model.free_run([first])
+    assert np.std(first.displacement - predicted) < 1.5 * 4e-9
 
 
 def test_plays_of_a_stage_that_was_driven_before_are_named():

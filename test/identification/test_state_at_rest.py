@@ -14,6 +14,8 @@
 
 """Stages of another form that were driven up and back before the records, which no record shows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -72,3 +74,23 @@ def test_other_drives_are_predicted_whatever_was_driven_before(kind, before, lar
         assert (found.model[MEMORY.name].array("turns").size > 0) == was_driven
     else:
         assert (HYSTERESIS.start_term.name in found.model) == was_driven
+
+
+@pytest.mark.parametrize(
+    ("kind", "before", "largest"),
+    [
+        ("relays", LOOP, 0.4),
+        pytest.param("generalised plays", LOOP, 0.4, marks=pytest.mark.soak),
+        pytest.param("Bouc-Wen, n = 1.6", LOOP, 0.4, marks=pytest.mark.soak),
+        ("Coleman-Hodgdon", LOOP, 0.4),
+        ("Coleman-Hodgdon", STILL, 0.6),
+    ],
+)
+def test_conditioning_shows_what_was_driven_before_it(kind, before, largest):
+    """No record that is fitted depends on it: all of them continue the conditioning."""
+    conditioning = ladder((0.0, 10.0, 0.0, 10.0, 0.0), 0.05, 20.0, PERIOD)
+    (whole,) = measured(kind, before, [np.concatenate((conditioning, *DRIVES))])
+    first, *later = whole.split(*np.cumsum([conditioning.size, *(u.size for u in DRIVES[:-1])]).tolist())
+    found = identify(Experiment((replace(first, phase="conditioning"), *later)), memory=True)
+    assert any(n.kind == "state_at_rest" for n in found.notices) == bool(before.any())
+    assert max(percent(found.model, measured(kind, before, [conditioning, *OTHERS]))) < largest

@@ -84,7 +84,8 @@ def _outweighed(accepted: Sequence[Step]) -> tuple[Step, Rejection] | None:
 def needed(accepted: Sequence[Step]) -> list[Step]:
     """The steps without those whose effects the newest one makes superfluous."""
     steps = list(accepted)
-    for step in accepted[:-1]:
+    for name in [step.best.name for step in accepted[:-1]]:
+        (step,) = (s for s in steps if s.best.name == name)
         newest, earlier = steps[-1].best, _beside_newest(step, steps)
         if is_certain(earlier):
             continue

@@ -196,7 +196,7 @@ def fit_pieces(
 
     names, damping, is_doubtful = tuple(names), FIRST_DAMPING, False
     now = PieceFit(model, names, *products(model, names))
-    while now.iterations < max_iterations and now.cost > PERFECT:
+    while names and now.iterations < max_iterations and now.cost > PERFECT:
         better, refused = None, 0
         while better is None and damping < FARTHEST:
             better = _step(now, products, damping, is_doubtful or refused > 0)

@@ -28,10 +28,11 @@ import numpy as np
 
 from ...effects import MEMORY
 from ...model.model import Model
-from ...record import Notice, Record
+from ...record import CONDITIONING, Notice, Record
+from ..fit.form_uncertainty import ADEQUACY
 from .mode import held_by
 from .piece_fit import PieceFit, best_step, cost_of, linearised
-from .pieces import RecordPiece
+from .pieces import RecordPiece, pieces_of
 from .pole_place import LinearPart
 from .structure_fit import fit_structure
 
@@ -88,6 +89,29 @@ def in_state_at_rest(
     cost = cost_of(anew.fit.model, anew.fit.names, lambda model, names: linearised(model, found.pieces, floors, names))
     other = anew if cost < further.fit.cost else further
     return other if min(cost, further.fit.cost) < CLEARLY * found.fit.cost else found
+
+
+def begun_as_conditioned(model: Model, records: Sequence[Record]) -> Model:
+    """The fitted model in the state at rest in which the conditioning began, if every run of records begins with one.
+
+    Conditioning is not fitted, and no other record depends on the state before it; but its first rise shows this state.
+
+    Parameters
+    ----------
+    model : Model
+        Fitted model.
+    records : sequence of Record
+        The experiment, in order.
+    """
+    shown = [record for i, record in enumerate(records) if i == 0 or not record.continues]
+    if rest_notices(model) or any(r.truncated or not r.is_named(CONDITIONING) or not np.ptp(r.voltage) for r in shown):
+        return model
+    pieces, held = pieces_of(shown, range(len(shown))), model.values()
+    sizes = [ADEQUACY * float(np.ptp(r.displacement)) for r in shown]
+    plain = fit_structure(model, pieces, sizes, held)
+    others = [fit_structure(other, pieces, sizes, held) for other in _driven_before(model, records)]
+    best = min(others, key=lambda fit: fit.cost, default=plain)
+    return best.model if best.cost < CLEARLY * plain.cost else model
 
 
 def rest_notices(model: Model) -> list[Notice]:

@@ -38,6 +38,7 @@ from piezo_hysteresis.effects import (
     Creep,
     CreepExponential,
     CreepFractional,
+    EvenInputPolynomial,
     Offset,
     ThermalDrift,
 )
@@ -113,6 +114,13 @@ def test_an_effect_that_a_later_one_makes_superfluous_is_taken_back(hidden):
     assert kept[0].before is steps[0].before
     assert (DRIFT.name in kept[-1].best.fit.model) is (DRIFT in hidden)
     assert [r.name for r in kept[-1].rejected] == ([] if DRIFT in hidden else [DRIFT.name])
+
+
+def test_two_effects_that_a_later_one_makes_superfluous_are_taken_back():
+    """The step after the first one had become another one, and `piezo diagnose` ended with a ValueError."""
+    (kept,) = needed(steps_with((DRIFT, EvenInputPolynomial(), CREEP), (CREEP,)))
+    assert kept.best.name == CREEP.name and kept.best.score.excess < ADEQUATE
+    assert {r.name for r in kept.rejected} == {DRIFT.name, EvenInputPolynomial.name}
 
 
 def test_no_effect_is_named_beside_later_ones_if_its_interval_does_not_exclude_that_it_is_absent():
