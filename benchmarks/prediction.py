@@ -20,7 +20,10 @@ shows. The rival is what a laboratory fits in an afternoon: ten plays and a line
 mode and a delay; it is told what was driven before. Errors are RMS in % of the range of the triangles, one constant
 free per record; all means are geometric.
 
+With ``--diagnosed``, `piezo diagnose` searches seven records of every stage, and the model that it saves predicts.
+
     python -m benchmarks.prediction --stages 2
+    python -m benchmarks.prediction --stages 2 --diagnosed
     python -m benchmarks.prediction --quick
 """
 
@@ -39,6 +42,7 @@ from benchmarks.naming_experiments import ladder
 from benchmarks.nanopositioner import Nanopositioner
 from benchmarks.other_forms import KINDS, random_stage
 from benchmarks.real_recordings import Prediction, free_run
+from piezo_hysteresis.discrepancy.diagnose import diagnose
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.record import Experiment, Record
 
@@ -109,6 +113,17 @@ def around_the_middle(wave: Array) -> Array:
     return np.concatenate((ladder((0.0, 0.5), 0.2, 2.0, PERIOD), 0.5 + 0.5 * wave / np.abs(wave).max()))
 
 
+def diagnosed_drives() -> dict[str, Array]:
+    """Phases of the experiment of a diagnosis, as shares of the top."""
+    loops = {"triangle_1": (1.0, 2, 1.0), "triangle_2": (0.6, 2, 1.0), "triangle_3": (1.0, 6, 5.0)}
+    return {
+        **{name: ladder((0.0, *(top, 0.0) * n), 0.0, 2.0 * top * f, PERIOD) for name, (top, n, f) in loops.items()},
+        "sine_5hz": 0.4 - 0.4 * np.cos(2.0 * np.pi * 5.0 * PERIOD * np.arange(4000)),
+        "minor_loops": ladder((0.0, 0.9, 0.3, 0.8, 0.1, 0.5, 0.2, 0.0), 0.02, 1.5, PERIOD),
+        **{name: fitted_drives()[name] for name in ("step", "noise")},
+    }
+
+
 def rival(records: Sequence[Record]) -> Prediction:
     """Plays by linear least squares, behind the best mode, damping and delay."""
 
@@ -150,6 +165,23 @@ def errors(stage: Nanopositioner, phases: Sequence[str], records: Mapping[str, R
     return np.array(left), float(percent * found.free_run_error), float(noise)
 
 
+def diagnosed(kinds: Sequence[str], stages: int) -> Figures:
+    """What is named of every stage, and the errors of the published and the saved model on the drives set aside."""
+    rows: list[tuple[Cell, ...]] = []
+    for kind in kinds:
+        for seed in range(stages):
+            stage = random_stage(KINDS[kind], seed)
+            used, others = ([measured(stage, *d) for d in f().items()] for f in (diagnosed_drives, other_drives))
+            found, percent = diagnose(Experiment(tuple(used))), 100.0 / np.ptp(used[0].displacement)
+            models = [free_run(m) for m in (found.baseline, found.model) if m is not None]
+            left = [[percent * float(np.std(r.displacement - p(r))) for r in others] for p in models]
+            rows.append(
+                (kind, seed, str(found.verdict), ", ".join(found.names), *mean(np.array(left), 1), max(left[1]))
+            )
+    columns = ("stage", "seed", "verdict", "named", "published model", "saved model", "saved model, largest")
+    return Figures("RMS error on drives that were not fitted, % of range", columns, rows)
+
+
 def mean(values: Array, axis: int | tuple[int, ...]) -> list[float]:
     """Geometric means."""
     return np.exp(np.log(values).mean(axis=axis)).tolist()
@@ -158,12 +190,15 @@ def mean(values: Array, axis: int | tuple[int, ...]) -> list[float]:
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Number of stages."""
     parser.add_argument("--stages", type=int, default=2, help="of every kind")
+    parser.add_argument("--diagnosed", action="store_true", help="the model that `piezo diagnose` saves")
     parser.add_argument("--quick", action="store_true", help="one stage of relays, triangles and noise")
 
 
 def run(options: argparse.Namespace) -> list[Figures]:
     """One row per kind of stage and experiment, then one row per drive."""
     kinds = ["relays"] if options.quick else list(KINDS)
+    if options.diagnosed:
+        return [diagnosed(kinds, 1 if options.quick else options.stages)]
     names = ["triangles + noise"] if options.quick else list(EXPERIMENTS)
     drives = {**fitted_drives(), **other_drives()}
     found: dict[tuple[str, str], list[tuple[Array, float, float]]] = {(k, n): [] for k in kinds for n in names}

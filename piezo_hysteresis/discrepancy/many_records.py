@@ -21,25 +21,29 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import DivergenceError
+from ..errors import DivergenceError, PiezoError
 from ..identification.fit.fit import Fit
 from ..identification.fit.form_uncertainty import with_alternative, with_form_uncertainty
-from ..identification.fit.time_limit import ending_at
+from ..identification.fit.time_limit import TimeSpentError, ending_at
+from ..identification.identification import Identification
+from ..identification.identify import identify
 from ..identification.records.excitation_check import missing_excitation
 from ..identification.records.noise_floor import ADEQUATE
+from ..identification.start_models import as_conditioning
+from ..model.model import Model
 from .choice.next_experiment import best_next_experiment
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .explicit_step import explicit_model, without_steps
-from .gap import gap_between
+from .gap import Gap, gap_between
 from .localise import ResidualShare, located
 from .search.baseline_setup import BaselineSetup, prepare_baseline
 from .search.refit import LAST, PRECISE, TOLERANCE, joint, restart
 from .search.selection import select
 from .search.selection_result import Selection
 from .search.training_data import TrainingData
-from .unnamed.offer import best_correction
-from .verdict import Conclusion, Verdict, is_explained, named_conclusion, unnamed_conclusion
+from .unnamed.offer import REMOVES, best_correction
+from .verdict import CHOSEN, Conclusion, Verdict, is_explained, named_conclusion, unnamed_conclusion
 
 STEPS_LEAVE = 10.0
 """Largest cost after the subtraction of an explicit step, if it is subtracted before the search."""
@@ -160,12 +164,19 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
         said = named_conclusion(selection, gap)
     conclusion, reason = said
     is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
+    structured = _structured(state, setup, first.model) if is_unexplained and given is None else None
+    if structured is not None:
+        identified, gap = structured
+        fit, delivered = identified.fit, identified.model
+        reason += f" {CHOSEN.format(f'{100 * gap.explained:.0f} %').capitalize()}."
     found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
     noted = state.experiment.noting(*missing_excitation(state.experiment.records, setup.usable, found))
-    everywhere = None
+    everywhere, correction = None, None
     if delivered is not given and len(tested) < len(setup.usable):
         with suppress(DivergenceError):
             everywhere = gap_between(delivered, delivered, setup, setup.usable, offset=given is not None)
+    if is_unexplained and structured is None:
+        correction = best_correction(final.model, setup, state.experiment)
     return Diagnosis(
         conclusion,
         reason,
@@ -177,8 +188,19 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
         where=where,
         gap=gap,
         next_experiment=best_next_experiment(selection, setup.training_data),
-        correction=best_correction(final.model, setup, state.experiment) if is_unexplained else None,
+        correction=correction,
     )
+
+
+def _structured(state: DiagnosisState, setup: BaselineSetup, published: Model) -> tuple[Identification, Gap] | None:
+    """The model of `identify` and its gap, if it explains much of what the published model leaves; else None."""
+    state.progress("structure", 0.9)
+    known = as_conditioning(state.experiment, setup.test_records)
+    with suppress(PiezoError, TimeSpentError), ending_at(state.end):
+        found = identify(known, held_out=(), memory=True)
+        gap = gap_between(published, found.model, setup, setup.tested)
+        return (found, gap) if found.structure is not None and gap.explained >= REMOVES else None
+    return None
 
 
 def _finished(selection: Selection, training_data: TrainingData) -> Fit:
