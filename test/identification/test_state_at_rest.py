@@ -82,7 +82,7 @@ def test_other_drives_are_predicted_whatever_was_driven_before(kind, before, lar
         ("relays", LOOP, 0.4),
         pytest.param("generalised plays", LOOP, 0.4, marks=pytest.mark.soak),
         pytest.param("Bouc-Wen, n = 1.6", LOOP, 0.4, marks=pytest.mark.soak),
-        ("Coleman-Hodgdon", LOOP, 0.4),
+        pytest.param("Coleman-Hodgdon", LOOP, 0.4, marks=pytest.mark.soak),
         ("Coleman-Hodgdon", STILL, 0.6),
     ],
 )
