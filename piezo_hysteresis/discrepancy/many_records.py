@@ -34,7 +34,7 @@ from ..model.model import Model
 from .choice.next_experiment import best_next_experiment
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
-from .explicit_step import explicit_model, without_steps
+from .explicit_step import BETTER, explicit_model, without_steps
 from .gap import Gap, gap_between
 from .localise import ResidualShare, located
 from .search.baseline_setup import BaselineSetup, prepare_baseline
@@ -65,28 +65,33 @@ DIVERGES = (
 def diagnose_many(state: DiagnosisState) -> Diagnosis:
     """Fit the baseline, add the missing effects, and conclude.
 
-    The error of an explicit step is subtracted if the user asked for it, otherwise the data have no verdict: before the
-    search only if nothing else is missing, after it with the first effects with which the data show it, if it explains
-    them better than all effects that were found. The search is repeated if time is left and the model that was found
-    corrects averaged samples differently.
+    If the error of an explicit step describes the data better than the effects that were found, it is subtracted if the
+    user asked for it; otherwise the data have no verdict. A loop that depends on speed leaves a similar error, so the
+    two are compared with everything that is found beside them. The search is repeated if time is left and the model
+    that was found corrects averaged samples differently.
     """
     setup = _baseline(state)
     explicit = None
     if setup.score.excess > ADEQUATE:
         explicit = explicit_model(setup.baseline.model, setup.training_data, STEPS_LEAVE)
-    selection = _search(state, setup) if explicit is None else None
-    if selection is not None and selection.in_time:
+    selection = _search(state, setup)
+    if explicit is not None:
+        freed = replace(state, experiment=without_steps(state.experiment, explicit))
+        if selection.score.excess < BETTER * _search(freed, _baseline(freed)).score.excess:
+            explicit = None
+    elif selection.in_time:
         bests = (s.best for s in selection.accepted if s.best.score.excess > ADEQUATE)
         reached = selection.accepted[-1].best.fit.cost if selection.accepted else np.inf
         models = (explicit_model(best.fit.model, best.training_data, reached) for best in bests)
         explicit = next((model for model in models if model is not None), None)
     if explicit is not None:
         if not state.explicit_step:
-            model, where = setup.baseline.model, _where(state, setup)
+            model = selection.baseline
+            where = _where(state, setup, model)
             return Diagnosis(Conclusion.INSUFFICIENT_DATA, EXPLICIT, model, model, state.experiment, where=where)
         state = replace(state, experiment=without_steps(state.experiment, explicit))
-        setup, selection = _baseline(state), None
-    selection = selection or _search(state, setup)
+        setup = _baseline(state)
+        selection = _search(state, setup)
     extends = selection.in_time and selection.accepted and state.corrects_intersample_error
     if extends and setup.changes_intersample_error(selection.model):
         sharper = _baseline(state, selection)
@@ -107,9 +112,9 @@ def _search(state: DiagnosisState, setup: BaselineSetup) -> Selection:
         return select(model, data, setup.score, state.effects, lambda w, f: state.progress(w, 0.4 + 0.4 * f))
 
 
-def _where(state: DiagnosisState, setup: BaselineSetup) -> tuple[ResidualShare, ...]:
+def _where(state: DiagnosisState, setup: BaselineSetup, model: Model) -> tuple[ResidualShare, ...]:
     state.progress("location of the residual", 0.82)
-    model, least = setup.baseline.model, setup.least.tolist()
+    least = setup.least.tolist()
     try:
         return located(model, setup.records, setup.usable, least)
     except DivergenceError:  # on a test record, which moves further than those that were fitted
@@ -122,7 +127,7 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
     The gap before is the own error of a given model, not that after a joint fit. It stays the model where no effect is
     named and the joint fit predicts the test records worse.
     """
-    where, given = _where(state, setup), state.model
+    where, given = _where(state, setup, selection.baseline), state.model
     state.progress("gap", 0.85)
     whole, noise = setup.for_last_fit()
     named = is_explained(selection)

@@ -43,7 +43,7 @@ from .candidate_refits import (
 )
 from .candidates import Candidate, FittedCandidate, screen
 from .earlier_effects import certain, in_best_laws, needed
-from .refit import converged
+from .refit import Fitted, converged, without
 from .selection_result import Rejection, Selection, Step
 from .training_data import TrainingData
 
@@ -83,6 +83,10 @@ def select(
             step = _turn(now, data, reached, effects, report)
             if step is None:
                 break
+            better = _better_without(step)
+            if better is not None and not steps:
+                model, now, score, reached = better.model, better.model, better.score, better.score
+                continue
             steps.append(step)
             if not step.accepted:
                 break
@@ -94,6 +98,14 @@ def select(
     found = next((step.best for step in reversed(steps) if step.accepted), None)
     now, reached, data = (found.fit.model, found.score, found.training_data) if found else (model, score, training_data)
     return Selection(model, now, reached, tuple(steps), data.null, in_time, data)
+
+
+def _better_without(step: Step) -> Fitted | None:
+    """The model refitted without a refused effect, if this lowers the cost: the baseline was in another minimum."""
+    if step.accepted or step.before.cost - step.best.score.cost < LEAST_GAIN:
+        return None
+    alone = without(step.best)
+    return alone if alone is not None and step.before.cost - alone.score.cost >= LEAST_GAIN else None
 
 
 def _turn(
