@@ -123,7 +123,7 @@ def _parser(chosen: str | None) -> argparse.ArgumentParser:
         prog="piezo",
         description="Identify models of piezo stages, check them, and find missing physical effects.",
         epilog="exit status: 0 success, 1 if the result cannot be trusted or the data do not determine it (the last "
-        "line says why), 2 for bad input",
+        "line says why; not after a verdict of `piezo diagnose`), 2 for bad input",
     )
     parser.add_argument("--version", action="version", version=f"piezo_hysteresis {__version__}")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)

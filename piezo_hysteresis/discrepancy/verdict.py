@@ -177,9 +177,10 @@ def conclusion_of_few(
     amplitude can be explained by wrong effects. `origin` says which model is saved, if it contains no further effect.
     """
     enough, is_adequate = count >= FEWEST_RECORDS, before.excess <= ADEQUATE
-    if gap.falls and decided:
+    explains = gap.falls and gap.explained >= NAMED
+    if explains and decided:
         return Conclusion.MISSING_EFFECT, _reason_of_structure(selection, gap)
-    if gap.falls and enough and several and is_explained(selection):
+    if explains and enough and several and is_explained(selection):
         return named_conclusion(selection, gap)
     if not selection.in_time:
         return unnamed_conclusion(selection, gap.falls, gap)

@@ -27,8 +27,10 @@ from ...identification.free_run_error import Error, Errors, free_per_record
 from ...identification.identified_range import outside
 from ...identification.records.comparable import comparable
 from ...identification.stage_check import check_stage
+from ...identification.structure.state_at_rest import begun_as_shown, rest_notices
 from ...model import model_file
-from ...record import CONDITIONING, Experiment
+from ...model.model import Model
+from ...record import CONDITIONING, Experiment, Notice
 from ...report.correlation import CAPTION, correlate
 from ...report.figures.comparison import ModelComparison, compare
 from ...report.json_file import write_json
@@ -77,9 +79,10 @@ def run(args: argparse.Namespace) -> int:
     if describes(now.percent) and not ((left or not check.is_as_good) and is_at_floor(comparison, now)):
         left = f" {floor_sentence(comparison, now)}{left}"
     verdict = f"{stage_sentence(check, now.percent, _cause(bool(beyond)))}{left}{_caveats(experiment)}"
-    notices = (*experiment.notices, *conditioned, *beyond)
     severe = any(notice.severe for notice in (*experiment.notices, *conditioned))
     trusted = can_be_trusted(check, now.percent) and not severe
+    other_state = () if is_at_floor(comparison, now) else _other_state(model, experiment)
+    notices = (*experiment.notices, *conditioned, *beyond, *other_state)
     if args.json is not None:
         said = {"verdict_text": verdict, "trusted": trusted, "notices": [asdict(notice) for notice in notices]}
         write_json(args.json, {**answer(comparison, now, tests), **said})
@@ -111,6 +114,16 @@ def _cause(leaves_range: bool) -> str:
     if leaves_range:
         first = ". The drive leaves the range that the model was identified on, which may be the cause. Otherwise the"
     return f"{first} stage has changed, or the drive shows what the model misses; see piezo diagnose --model."
+
+
+def _other_state(model: Model, experiment: Experiment) -> tuple[Notice, ...]:
+    """Whether the model predicts the records much better in the state of a stage that was driven before them."""
+    driven = begun_as_shown(model, experiment.records)
+    if driven is model:
+        return ()
+    (notice,), left = rest_notices(driven), check_stage(driven, experiment.records).percent
+    message = f"{notice.message}; begun there, the model leaves {left:.3g} % of the range"
+    return (Notice(notice.kind, message),)
 
 
 def _caveats(experiment: Experiment) -> str:

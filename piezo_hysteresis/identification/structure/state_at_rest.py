@@ -30,14 +30,15 @@ from ...effects import MEMORY
 from ...model.model import Model
 from ...record import CONDITIONING, Notice, Record
 from ..fit.form_uncertainty import ADEQUACY
+from ..identified_range import HIGHEST, LOWEST
 from .mode import held_by
-from .piece_fit import PieceFit, best_step, cost_of, linearised
+from .piece_fit import PieceFit, cost_of, linearised
 from .pieces import RecordPiece, pieces_of
 from .pole_place import LinearPart
 from .structure_fit import fit_structure
 
-PROMISES = 0.9
-"""Largest share of the cost after one step in another state from which this state is fitted."""
+FIRST, PROMISES = 2, 0.9
+"""Number of linearisations in every other state, and largest share of the cost from which the best one is fitted."""
 CLEARLY = 0.7
 """Largest share of the cost that another state leaves; otherwise the stage counts as not driven before the records."""
 
@@ -79,7 +80,7 @@ def in_state_at_rest(
     """
     found = describe(begun)
     held, models = held_by(found.fit), _driven_before(found.fit.model, records)
-    costs = [_cost_after_step(fit_structure(model, found.pieces, floors, held, 1)) for model in models]
+    costs = [fit_structure(model, found.pieces, floors, held, FIRST).cost for model in models]
     if not min(costs, default=np.inf) < PROMISES * found.fit.cost:
         return found
     best = int(np.argmin(costs))
@@ -104,10 +105,24 @@ def begun_as_conditioned(model: Model, records: Sequence[Record]) -> Model:
         The experiment, in order.
     """
     shown = [record for i, record in enumerate(records) if i == 0 or not record.continues]
-    if rest_notices(model) or any(r.truncated or not r.is_named(CONDITIONING) or not np.ptp(r.voltage) for r in shown):
+    return begun_as_shown(model, shown) if all(r.is_named(CONDITIONING) for r in shown) else model
+
+
+def begun_as_shown(model: Model, records: Sequence[Record]) -> Model:
+    """The fitted model in the state at rest from which it predicts the records best; unchanged if it has one.
+
+    Parameters
+    ----------
+    model : Model
+        Fitted model.
+    records : sequence of Record
+        Records of the same stage, in order.
+    """
+    starts = [record for i, record in enumerate(records) if i == 0 or not record.continues]
+    if rest_notices(model) or any(r.truncated for r in starts) or not any(np.ptp(r.voltage) for r in records):
         return model
-    pieces, held = pieces_of(shown, range(len(shown))), model.values()
-    sizes = [ADEQUACY * float(np.ptp(r.displacement)) for r in shown]
+    pieces, held = pieces_of(records, range(len(records))), model.values()
+    sizes = [ADEQUACY * max(float(np.ptp(r.displacement)) for r in records)] * len(records)
     plain = fit_structure(model, pieces, sizes, held)
     others = [fit_structure(other, pieces, sizes, held) for other in _driven_before(model, records)]
     best = min(others, key=lambda fit: fit.cost, default=plain)
@@ -115,16 +130,16 @@ def begun_as_conditioned(model: Model, records: Sequence[Record]) -> Model:
 
 
 def rest_notices(model: Model) -> list[Notice]:
-    """``state_at_rest`` if the stage was driven before the records."""
+    """``state_at_rest`` if the model begins as a stage that was driven before."""
     term = model.hysteresis.start_term
     if term is not None and term.name in model:
         h0 = ", ".join(f"{value:.3g}" for value in model[term.name].free_values())
-        where = f"the state of {model.hysteresis.name} is {h0}"
+        where = f"the state of {model.hysteresis.name} at rest is {h0}"
     elif MEMORY.name in model and (turns := model[MEMORY.name].array("turns")).size:
-        where = f"its plays are as after {' and '.join(f'{model.voltage_scale * v:.4g} V' for v in turns)}"
+        where = f"its plays at rest are as after {' and '.join(f'{model.voltage_scale * v:.4g} V' for v in turns)}"
     else:
         return []
-    return [Notice("state_at_rest", f"the stage was driven before the records: at rest, {where}")]
+    return [Notice("state_at_rest", f"the records begin as those of a stage that was driven before: {where}")]
 
 
 def lead_of_state(fit: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> dict[str, float]:
@@ -141,8 +156,9 @@ def _driven_before(model: Model, records: Sequence[Record]) -> list[Model]:
     if MEMORY.name not in model:
         term = model.hysteresis.start_term
         return [model.with_effect(term())] if term is not None else []
-    plays, u = model.effect(MEMORY), [np.append(r.voltage, r.settled_voltage) for r in records]
-    low, high = (float(end) / model.voltage_scale for end in (min(map(np.min, u)), max(map(np.max, u))))
+    plays, known = model.effect(MEMORY), [float(model.provenance.get(k, np.nan)) for k in (LOWEST, HIGHEST)]
+    u = np.concatenate([known, *(np.append(r.voltage, r.settled_voltage) for r in records)]) / model.voltage_scale
+    low, high = float(np.nanmin(u)), float(np.nanmax(u))
     near, far = (records[0].settled_voltage / model.voltage_scale + side * plays.radii for side in (-1.0, 1.0))
     states, found = [np.clip(0.0, near, far)], []
     half = 0.5 * (low + high)
@@ -153,9 +169,3 @@ def _driven_before(model: Model, records: Sequence[Record]) -> list[Model]:
             states.append(state)
             found.append(model.with_effect(driven))
     return found
-
-
-def _cost_after_step(fit: PieceFit) -> float:
-    """Cost after the best step, to first order."""
-    step = best_step(fit, fit.total)
-    return float(fit.total[-1, -1] - 2.0 * step @ fit.total[:-1, -1] + step @ fit.total[:-1, :-1] @ step)

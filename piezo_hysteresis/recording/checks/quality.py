@@ -167,10 +167,10 @@ def _order(experiment: Experiment) -> list[Notice]:
 def _named_frequency(record: Record) -> list[Notice]:
     """Notice where the frequency in the name of a sine differs from that of its drive."""
     named, found = _SINE.fullmatch(record.phase), _SINE.fullmatch(phase_name(record.voltage, record.sample_period))
-    if named is None or found is None or abs(float(found[1]) / float(named[1]) - 1) < _FREQUENCY_MISMATCH:
-        return []
-    if float(found[1]) * record.duration < _FEWEST_PERIODS:
+    if named is None or found is None or (periods := float(found[1]) * record.duration) < _FEWEST_PERIODS:
         return []  # in a single period the ends influence the frequency
+    if abs(float(found[1]) / float(named[1]) - 1) < _FREQUENCY_MISMATCH + 0.5 / periods:
+        return []  # half a period of rest or of another drive
     text = f"the drive moves at {found[1]} Hz; the name or the sample period {record.sample_period:g} s is wrong"
     return [Notice("sample_period", text, record.phase, severe=True)]
 

@@ -452,3 +452,14 @@ def test_an_initial_voltage_belongs_to_the_first_row_of_the_file(tmp_path):
     assert (lead.size, lead.settled_voltage) == (2100, 0.0)
     assert wanted.continues and wanted.initial_voltage is None
     assert any("initial voltage of 0 V is that of the first row" in n.message for n in found.notices)
+
+
+def test_two_periods_do_not_contradict_a_rounded_name():
+    """A sine of 16.7 Hz, two periods that fade in and out, was said to be one of 19 Hz, and `piezo diagnose` gave no verdict."""
+    time = PERIOD * np.arange(1200)
+    drive = 3.0 * np.sin(2.0 * np.pi * 16.67 * time) * np.minimum(1.0, np.minimum(time, time[::-1]) / 0.05)
+    right = Record(drive, stage(drive), PERIOD, "sine_17hz")
+    assert not any(n.severe for n in inspect(Experiment((right,))))
+    many = sine(17.0, 2.0)
+    (notice,) = found("sample_period", Record(many, stage(many), 1.5 * PERIOD, "sine_17hz"))
+    assert notice.severe
