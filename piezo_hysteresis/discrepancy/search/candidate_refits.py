@@ -20,14 +20,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-from ...effects import AmplifierSaturation
+from ...effects import AmplifierSaturation, Creep, CreepExponential, ThermalDrift
 from ...effects.effect import ChainPosition
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Progress
 from ...identification.records.noise_floor import ADEQUATE
+from ...identification.structure.prior import CREEP
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate
-from .refit import FIRST, LAG, LATER, collected, from_all_starts, proceed, refit, restart
+from .refit import FIRST, LAG, LATER, collected, from_all_starts, proceed, refit, refit_anew, restart
 
 LEAST_GAIN = 0.15
 """Smallest gain in mean ln max(1, R²) for which an effect is accepted."""
@@ -79,6 +80,18 @@ def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], be
     is_far = before.excess > ADEQUATE
     bending = [c for c in candidates if _bends_dynamics(c) and (is_far or c.effect.family == LAG)]
     return collected(partial(settled, before=before), collected(partial(from_all_starts, model), bending))
+
+
+def refits_of_creep(model: Model, candidates: Sequence[Candidate], best: FittedCandidate) -> list[FittedCandidate]:
+    """Refits of creep of a usual size behind new dynamics, if a drift or relaxations are best.
+
+    The slow poles of the dynamics can contain creep, so that it gains nothing beside them, and only its slowest part,
+    which a drift or a relaxation describes, is left.
+    """
+    if best.name not in (ThermalDrift.name, CreepExponential.name):
+        return []
+    usual = [replace(c, effect=c.effect.with_values(gamma=CREEP)) for c in candidates if c.name == Creep.name]
+    return collected(partial(refit_anew, model), usual)
 
 
 def _bends_dynamics(candidate: Candidate) -> bool:

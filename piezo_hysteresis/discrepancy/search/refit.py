@@ -168,6 +168,11 @@ def from_all_starts(model: Model, candidate: Candidate) -> FittedCandidate | Non
     return _from_best(found, candidate, FIRST)
 
 
+def refit_anew(model: Model, candidate: Candidate) -> FittedCandidate | None:
+    """Refit of the model with the candidate from its start values and newly estimated dynamics; None if it diverges."""
+    return _from_best([_behind_anew(model.with_effect(candidate.effect), candidate.training_data)], candidate, LATER)
+
+
 def _from_best(starts: Iterable[Fitted | None], candidate: Candidate, max_iterations: int) -> FittedCandidate | None:
     best = min(filter(None, starts), key=BY_COST, default=None)
     return None if best is None else _refitted(best.model, candidate, max_iterations, best.linearised)

@@ -38,6 +38,7 @@ from .candidate_refits import (
     leaves_room,
     refit_candidates,
     refits_behind_new_dynamics,
+    refits_of_creep,
     refits_of_relatives,
     simplest,
 )
@@ -163,7 +164,8 @@ def _best_effect(
     rejection: Rejection | None = None
     refits = best_of_each(refit_candidates(model, _worth_a_refit(screened, before), before, progress))
     if refits:
-        refits = best_of_each([*refits, *refits_of_relatives(screened, refits[0], before)])
+        relatives = refits_of_relatives(screened, refits[0], before)
+        refits = best_of_each([*refits, *relatives, *refits_of_creep(model, screened, refits[0])])
         best, rejection = _judged(refits, before)
     tried = screened
     if best is not None and rejection is None:  # a fit that leaves an error may have ended in another minimum

@@ -40,7 +40,8 @@ def test_the_state_before_the_record_is_named_where_it_is_the_cause(turns, tmp_p
     noise = 2e-9 * np.random.default_rng(0).normal(size=u.size)
     write(Experiment((Record(u, y + noise, 1e-3, "loops"),)), tmp_path / "record.csv")
     model_file.save(stage(plays), tmp_path / "model.yaml")
-    main(["validate", *(str(tmp_path / n) for n in ("model.yaml", "record.csv")), "--json", str(tmp_path / "said.json")])
+    model, record, answer = (str(tmp_path / name) for name in ("model.yaml", "record.csv", "said.json"))
+    main(["validate", model, record, "--json", answer])
     said = json.loads((tmp_path / "said.json").read_text())
     found = [n["message"] for n in said["notices"] if n["kind"] == "state_at_rest"]
     if not turns:

@@ -455,7 +455,7 @@ def test_an_initial_voltage_belongs_to_the_first_row_of_the_file(tmp_path):
 
 
 def test_two_periods_do_not_contradict_a_rounded_name():
-    """A sine of 16.7 Hz, two periods that fade in and out, was said to be one of 19 Hz, and `piezo diagnose` gave no verdict."""
+    """Two periods of 16.7 Hz that fade in and out were said to be of 19 Hz, and `piezo diagnose` gave no verdict."""
     time = PERIOD * np.arange(1200)
     drive = 3.0 * np.sin(2.0 * np.pi * 16.67 * time) * np.minimum(1.0, np.minimum(time, time[::-1]) / 0.05)
     right = Record(drive, stage(drive), PERIOD, "sine_17hz")
