@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-from ...effects import AmplifierSaturation, Creep, CreepExponential, ThermalDrift
+from ...effects import AmplifierSaturation, Creep, ThermalDrift
 from ...effects.effect import ChainPosition
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Progress
@@ -83,12 +83,12 @@ def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], be
 
 
 def refits_of_creep(model: Model, candidates: Sequence[Candidate], best: FittedCandidate) -> list[FittedCandidate]:
-    """Refits of creep of a usual size behind new dynamics, if a drift or relaxations are best.
+    """Refits of creep of a usual size behind new dynamics, if creep or a drift is best.
 
-    The slow poles of the dynamics can contain creep, so that it gains nothing beside them, and only its slowest part,
-    which a drift or a relaxation describes, is left.
+    The slow poles of the dynamics can contain a part of creep or all of it but its slowest part, which a drift or a
+    relaxation describes.
     """
-    if best.name not in (ThermalDrift.name, CreepExponential.name):
+    if best.effect.family not in (Creep.family, ThermalDrift.family):
         return []
     usual = [replace(c, effect=c.effect.with_values(gamma=CREEP)) for c in candidates if c.name == Creep.name]
     return collected(partial(refit_anew, model), usual)
