@@ -22,6 +22,7 @@ correlated scores, for the finite length of the baseline, and for misfit of the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,6 +72,10 @@ class Change:
     watched: bool = False
 
 
+GROWTH = 6.0
+"""Variance of a random walk after the time of the baseline, over that of its windows about their mean."""
+
+
 class ChangeDetector:
     """Compares scores with a baseline.
 
@@ -93,6 +98,7 @@ class ChangeDetector:
         self._interval = false_alarm_interval
         self._thresholds: dict[DriveClass, float] = {}
         self._window: list[tuple[Array, Array, int, DriveClass]] = []
+        self._age, self._counted = 0, sum(scatter.count for scatter in baseline.scatter.values())
 
     def add(self, score: ChangeScore) -> Change:
         """Compare the next score with the baseline, and return the result of the watch."""
@@ -108,6 +114,7 @@ class ChangeDetector:
             return Change(watched=True)
         if self._offset_weight:
             gradient = gradient - weight[:, _OFFSET] * (self._offset / self._offset_weight)
+        self._age += 1
         self._window.append((gradient, weight, score.stamp - round(score.duration * 1e9), key))
         del self._window[:-WINDOW]
         sums = [np.cumsum([row[k] for row in reversed(self._window)], axis=0) for k in (0, 1)]
@@ -147,10 +154,22 @@ class ChangeDetector:
             mean += own**2 / np.where(information > 0.0, information, np.inf) / there
             inflation += own / there * known.inflation(len(weights))
             wander += own / there * known.wander
+        wander[:, _OFFSET] += self._drift_since(classes)
         variance = 1.0 + mean
         if not self._same_offset:
             variance = variance + _squared_cosine_to_offset(scatter) * length / OFFSET_SCORES
         return variance * inflation + (wander if beside is None else _drift(beside, wander)) * weights
+
+    def _drift_since(self, classes: Sequence[DriveClass]) -> float:
+        """Variance by which the offset may have drifted since the baseline [m²], as a random walk does.
+
+        The baseline shows no drift that is smaller than the noise of its windows.
+        """
+        known = [self._baseline.scatter[key] for key in set(classes)]
+        seen = [s for s in known if s.weight[_OFFSET] > 0.0]
+        hidden = [s.inflation(WINDOW)[-1, _OFFSET] / (WINDOW * s.weight[_OFFSET]) for s in seen]
+        walked = max(s.wander[_OFFSET] for s in known) + max(hidden, default=0.0)
+        return float(GROWTH * self._age / self._counted * walked)
 
     def _threshold(self, duration: float) -> float:
         """The largest threshold of the classes of drive in the window."""
