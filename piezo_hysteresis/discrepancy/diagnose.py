@@ -32,7 +32,7 @@ from ..identification.records.comparable import comparable
 from ..identification.records.excitation_check import check_motion, moves
 from ..identification.records.roles import roles_of
 from ..identification.records.sampling import is_faster, resampled
-from ..identification.structure.state_at_rest import begun_as_conditioned
+from ..identification.structure.state_at_rest import begun_as_conditioned, without_hidden_state
 from ..model.model import Model
 from ..record import Notice, Record
 from .diagnosis import Diagnosis
@@ -109,12 +109,14 @@ def diagnose(
     end = time.monotonic() + time_limit
     progress = progress or (lambda word, fraction: None)
     recorded = experiment_of(experiment)
+    if model is not None:
+        model = without_hidden_state(model, recorded.records)
     state = DiagnosisState(recorded, model, effects, progress, end, explicit_step, given=recorded)
     # diverging trials have a large cost
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"), using_cores(cores):
         state = prepare(state)
         try:
-            return _begun(compared_with_given(_without_verdict(state) or _answer(_resampled(state))), model)
+            return _begun(compared_with_given(_without_verdict(state) or _answer(_resampled(state))))
         except IdentificationError as error:  # of the model that the diagnosis begins with
             message = str(error)
             if not message.startswith("identify:"):
@@ -122,9 +124,9 @@ def diagnose(
             raise IdentificationError("diagnose" + message.removeprefix("identify")) from error
 
 
-def _begun(found: Diagnosis, given: Model | None) -> Diagnosis:
-    """The answer, whose models begin as conditioning phases show, unless the model was given."""
-    if given is not None or found.model is None or found.baseline is None:
+def _begun(found: Diagnosis) -> Diagnosis:
+    """The answer, whose models begin as conditioning phases show."""
+    if found.model is None or found.baseline is None:
         return found
     model, baseline = (begun_as_conditioned(m, found.experiment.records) for m in (found.model, found.baseline))
     return replace(found, model=model, baseline=baseline)

@@ -104,8 +104,23 @@ def begun_as_conditioned(model: Model, records: Sequence[Record]) -> Model:
     records : sequence of Record
         The experiment, in order.
     """
-    shown = [record for i, record in enumerate(records) if i == 0 or not record.continues]
+    shown = _starts(records)
     return begun_as_shown(model, shown) if all(r.is_named(CONDITIONING) for r in shown) else model
+
+
+def without_hidden_state(model: Model, records: Sequence[Record]) -> Model:
+    """The model without the state of its operator at rest, if every run of records begins with a conditioning phase.
+
+    No fitted record depends on it then, and a joint fit would move it anywhere.
+    """
+    term = model.hysteresis.start_term
+    hidden = term is not None and term.name in model and all(r.is_named(CONDITIONING) for r in _starts(records))
+    return model.without(term.name) if hidden and term is not None else model
+
+
+def _starts(records: Sequence[Record]) -> list[Record]:
+    """The first record of every run."""
+    return [record for i, record in enumerate(records) if i == 0 or not record.continues]
 
 
 def begun_as_shown(model: Model, records: Sequence[Record]) -> Model:
@@ -118,8 +133,7 @@ def begun_as_shown(model: Model, records: Sequence[Record]) -> Model:
     records : sequence of Record
         Records of the same stage, in order.
     """
-    starts = [record for i, record in enumerate(records) if i == 0 or not record.continues]
-    if rest_notices(model) or any(r.truncated for r in starts) or not any(np.ptp(r.voltage) for r in records):
+    if rest_notices(model) or any(r.truncated for r in _starts(records)) or not any(np.ptp(r.voltage) for r in records):
         return model
     pieces, held = pieces_of(records, range(len(records))), model.values()
     sizes = [ADEQUACY * max(float(np.ptp(r.displacement)) for r in records)] * len(records)
