@@ -17,8 +17,9 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from piezo_hysteresis import Experiment, Record, diagnose
+from piezo_hysteresis import Experiment, Record, diagnose, identify
 from piezo_hysteresis.effects import AmplifierBandwidth, Arx, BoucWen, HysteresisMemory
 from piezo_hysteresis.model.model import Model
 
@@ -53,11 +54,13 @@ def measured(stage, before, records):
     return Experiment((replace(first, continues=False), *later))
 
 
-def test_a_named_model_begins_as_the_conditioning_shows():
+@pytest.mark.parametrize("is_given", [False, True])
+def test_a_named_model_begins_as_the_conditioning_shows(is_given):
     """No other record depends on the state before it; the extended model predicts it down to the noise."""
     stage = Model((BoucWen(), AmplifierBandwidth(tau=5e-3), Arx(a=(-0.5,), b=(0.5,), delay=1.0)), PERIOD, 10.0, 1e-5)
     before = np.concatenate((triangle(10.0, 1.0), np.zeros(200)))
-    found = diagnose(measured(stage, before, {"conditioning": triangle(10.0, 1.0), **drives()}))
+    experiment = measured(stage, before, {"conditioning": triangle(10.0, 1.0), **drives()})
+    found = diagnose(experiment, identify(experiment).model if is_given else None)
     assert found.names == ("amplifier_bandwidth",)
     first = found.experiment[0]
     (predicted,) = found.model.free_run([first])
