@@ -104,8 +104,7 @@ def begun_as_conditioned(model: Model, records: Sequence[Record]) -> Model:
     records : sequence of Record
         The experiment, in order.
     """
-    shown = _starts(records)
-    return begun_as_shown(model, shown) if all(r.is_named(CONDITIONING) for r in shown) else model
+    return begun_as_shown(model, _starts(records)) if _is_hidden(records) else model
 
 
 def without_hidden_state(model: Model, records: Sequence[Record]) -> Model:
@@ -114,8 +113,14 @@ def without_hidden_state(model: Model, records: Sequence[Record]) -> Model:
     No fitted record depends on it then, and a joint fit would move it anywhere.
     """
     term = model.hysteresis.start_term
-    hidden = term is not None and term.name in model and all(r.is_named(CONDITIONING) for r in _starts(records))
-    return model.without(term.name) if hidden and term is not None else model
+    if term is None or term.name not in model or not _is_hidden(records):
+        return model
+    return model.without(term.name)
+
+
+def _is_hidden(records: Sequence[Record]) -> bool:
+    """Whether every run begins with a conditioning phase, so that no other record depends on the state before it."""
+    return all(record.is_named(CONDITIONING) for record in _starts(records))
 
 
 def _starts(records: Sequence[Record]) -> list[Record]:

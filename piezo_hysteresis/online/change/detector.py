@@ -35,6 +35,9 @@ from .score import GROUPS, ChangeScore
 
 Array = NDArray[np.float64]
 
+GROWTH = 6.0
+"""Variance of a random walk after the time of the baseline, over that of its windows about their mean."""
+
 ALIKE = 0.97
 """If the cosine between the directions of two groups is larger, the present drive cannot distinguish the groups."""
 
@@ -72,10 +75,6 @@ class Change:
     watched: bool = False
 
 
-GROWTH = 6.0
-"""Variance of a random walk after the time of the baseline, over that of its windows about their mean."""
-
-
 class ChangeDetector:
     """Compares scores with a baseline.
 
@@ -99,6 +98,7 @@ class ChangeDetector:
         self._thresholds: dict[DriveClass, float] = {}
         self._window: list[tuple[Array, Array, int, DriveClass]] = []
         self._age, self._counted = 0, sum(scatter.count for scatter in baseline.scatter.values())
+        self._hidden_drift = {key: _hidden_drift(scatter) for key, scatter in baseline.scatter.items()}
 
     def add(self, score: ChangeScore) -> Change:
         """Compare the next score with the baseline, and return the result of the watch."""
@@ -165,10 +165,9 @@ class ChangeDetector:
 
         The baseline shows no drift that is smaller than the noise of its windows.
         """
-        known = [self._baseline.scatter[key] for key in set(classes)]
-        seen = [s for s in known if s.weight[_OFFSET] > 0.0]
-        hidden = [s.inflation(WINDOW)[-1, _OFFSET] / (WINDOW * s.weight[_OFFSET]) for s in seen]
-        walked = max(s.wander[_OFFSET] for s in known) + max(hidden, default=0.0)
+        keys = set(classes)
+        shown = max(self._baseline.scatter[key].wander[_OFFSET] for key in keys)
+        walked = shown + max(self._hidden_drift[key] for key in keys)
         return float(GROWTH * self._age / self._counted * walked)
 
     def _threshold(self, duration: float) -> float:
@@ -196,6 +195,12 @@ def _apart_from_offset(direction: Array) -> Array:
     along = direction @ offset / np.maximum(offset @ offset, np.finfo(np.float64).tiny)
     along[_OFFSET] = 0.0
     return np.asarray(direction - np.outer(along, offset))
+
+
+def _hidden_drift(scatter: Scatter) -> float:
+    """Variance of the mean offset of a window by noise [m²], below which a baseline shows no drift."""
+    weight = scatter.weight[_OFFSET]
+    return float(scatter.inflation(WINDOW)[-1, _OFFSET] / (WINDOW * weight)) if weight > 0.0 else 0.0
 
 
 def _drift(weights: Array, wander: Array) -> Array:
