@@ -75,9 +75,9 @@ def diagnose_many(state: DiagnosisState) -> Diagnosis:
     if setup.score.excess > ADEQUATE:
         explicit = explicit_model(setup.baseline.model, setup.training_data, STEPS_LEAVE)
     selection = _search(state, setup)
-    if explicit is not None:
-        freed = replace(state, experiment=without_steps(state.experiment, explicit))
-        if selection.score.excess < BETTER * _search(freed, _baseline(freed)).score.excess:
+    freed = None if explicit is None else _freed(state, explicit)
+    if freed is not None:
+        if selection.score.excess < BETTER * freed[2].score.excess:
             explicit = None
     elif selection.in_time:
         bests = (s.best for s in selection.accepted if s.best.score.excess > ADEQUATE)
@@ -89,15 +89,20 @@ def diagnose_many(state: DiagnosisState) -> Diagnosis:
             model = selection.baseline
             where = _where(state, setup, model)
             return Diagnosis(Conclusion.INSUFFICIENT_DATA, EXPLICIT, model, model, state.experiment, where=where)
-        state = replace(state, experiment=without_steps(state.experiment, explicit))
-        setup = _baseline(state)
-        selection = _search(state, setup)
+        state, setup, selection = freed or _freed(state, explicit)
     extends = selection.in_time and selection.accepted and state.corrects_intersample_error
     if extends and setup.changes_intersample_error(selection.model):
         sharper = _baseline(state, selection)
         again = _search(state, sharper)
         setup, selection = (sharper, again) if again.in_time else (setup, selection)
     return _concluded(state, setup, selection)
+
+
+def _freed(state: DiagnosisState, explicit: Model) -> tuple[DiagnosisState, BaselineSetup, Selection]:
+    """The data without the error of an explicit step, their baseline, and what is found in them."""
+    state = replace(state, experiment=without_steps(state.experiment, explicit))
+    setup = _baseline(state)
+    return state, setup, _search(state, setup)
 
 
 def _baseline(state: DiagnosisState, known: Selection | None = None) -> BaselineSetup:

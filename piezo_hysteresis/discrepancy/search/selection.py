@@ -84,8 +84,7 @@ def select(
             step = _turn(now, data, reached, effects, report)
             if step is None:
                 break
-            better = _better_without(step)
-            if better is not None and not steps:
+            if not steps and (better := _better_without(step)) is not None:
                 model, now, score, reached = better.model, better.model, better.score, better.score
                 continue
             steps.append(step)
