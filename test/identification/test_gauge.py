@@ -99,3 +99,14 @@ def test_a_sensor_of_reversed_sign_is_no_lag():
         found.append([comparison.lag_from_v, comparison.lag_from_w])
     assert found[0][1] == pytest.approx(arx.group_delay * 1e-4, rel=0.05)
     assert found[1] == pytest.approx(found[0])
+
+
+def test_the_lag_above_a_mode_is_more_than_half_a_cycle():
+    """The phase was wrapped: a lag of 1.26 ms at 500 Hz was said to be -0.74 ms."""
+    pole = np.exp(2e-4 * np.pi * 400.0 * (-0.033 + 1j))
+    a = np.real(np.poly([pole, pole.conj()]))
+    model = Model((BoucWen(), Arx(a=tuple(a[1:]), b=(a.sum(),), delay=3.0)), 1e-4, 10.0, 1e-5)
+    drive = 5.0 + np.random.default_rng(1).standard_normal(4000)
+    (comparison,), _ = compare_inputs(model, [Record(drive, model.simulate(drive), 1e-4, "noise")], [0], 3, (2, 1))
+    assert 1e-3 < comparison.lag_from_w < 1.5e-3
+    assert f"the lag at 500 Hz is {comparison.lag_from_w * 1e6:.4g}" in str(comparison)

@@ -21,8 +21,12 @@ import pytest
 from scipy.signal import sawtooth
 
 from benchmarks.nanopositioner import Nanopositioner, growing_sine
+from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.identification.free_run_error import errors, free_per_record
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.structure.mode import mode_notices
+from piezo_hysteresis.identification.structure.piece_fit import PieceFit
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment
 
 PERIOD = 5e-4
@@ -103,3 +107,14 @@ def test_samples_that_ring_at_another_frequency_than_the_stage_are_given_no_mode
     assert any(f == pytest.approx(mode, rel=0.01) for f in told)
     free = free_per_record(found.model, offset=True)
     assert errors(found.model, Experiment((played[judged],)), free).percent < 0.1
+
+
+def test_the_frequency_that_is_told_is_that_of_the_pole_that_moves_the_stage():
+    """A stage that rings at 900 Hz was said to ring at 4029 Hz, from a pole with a millionth of a step."""
+    period, damped = 1e-4, np.array([[900.0, 0.033], [4000.0, 0.001]])
+    poles = np.exp(2e-4 * np.pi * damped[:, 0] * (-damped[:, 1] + 1j * np.sqrt(1.0 - damped[:, 1] ** 2)))
+    mode, weak = (np.real(np.poly([p, p.conj()])) for p in poles)
+    numerator = mode.sum() * (weak + 1e-6)  # nearly cancels the weak pole
+    arx = Arx(a=tuple(np.convolve(mode, weak)[1:]), b=tuple(numerator), delay=1.0)
+    (said,) = mode_notices(PieceFit(Model((BoucWen(), arx), period), (), np.zeros((0, 1, 1)), np.zeros(0)))
+    assert "they ring at 900 Hz;" in said.message

@@ -35,6 +35,8 @@ from .three_steps import voltage_signals
 
 LOW, HIGH = 20.0, 500.0
 """Frequencies at which the gains of G are compared [Hz]."""
+STEPS = 500
+"""Number of frequencies between them at which the phase is followed, which a mode turns by half a cycle."""
 TOLERANCE = 0.05
 """Relative difference from which an amplitude dependence is reported."""
 
@@ -65,15 +67,15 @@ class InputComparison:
     def __str__(self) -> str:
         return (
             f"noise of {self.amplitude:.3g} V rms: |G({LOW:g} Hz)|/|G({HIGH:g} Hz)| is {self.from_w:.3f} without and "
-            f"{self.from_v:.3f} with the hysteresis; the lag is {self.lag_from_w * 1e6:.4g} and "
+            f"{self.from_v:.3f} with the hysteresis; the lag at {HIGH:g} Hz is {self.lag_from_w * 1e6:.4g} and "
             f"{self.lag_from_v * 1e6:.4g} µs"
         )
 
 
 def _shape(dynamics: Dynamics) -> tuple[float, float, float]:
-    low, high = dynamics.response(np.array([LOW, HIGH]))
-    turned = -np.angle(high * np.sign(low.real))  # a reversed sensor is no lag
-    return abs(low) / abs(high), float(turned) / (2.0 * np.pi * HIGH), abs(high)
+    gains = dynamics.response(np.linspace(LOW, HIGH, STEPS))
+    turned = -np.unwrap(np.angle(gains * np.sign(gains[0].real)))  # a reversed sensor is no lag
+    return abs(gains[0]) / abs(gains[-1]), float(turned[-1]) / (2.0 * np.pi * HIGH), abs(gains[-1])
 
 
 def compare_inputs(

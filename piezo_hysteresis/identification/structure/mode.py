@@ -20,7 +20,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...effects import ExtraResonance
+from ...effects import Arx, ExtraResonance
 from ...model.model import Model
 from ...record import Notice
 from ..records.excitation_content import excitation_content
@@ -45,6 +45,8 @@ A fit that ends with more describes a lag, for which there is a delay and a pole
 """
 SILENT_DAMPING = 0.2
 """Damping ratio assumed for a mode that does not ring; its lag is part of the delay."""
+VISIBLE = 0.001
+"""Smallest share of a step that a pole of the dynamics contributes, if it is told that it rings."""
 FARTHEST_ALIAS = 4.0
 """Largest ratio of the frequency of a mode that rings alike in the samples to that of the mode, if it is told."""
 WHOLE = 0.3
@@ -126,11 +128,12 @@ def lag_of_mode(model: Model) -> float:
 
 def mode_notices(fit: PieceFit) -> list[Notice]:
     """``ringing`` with the numbers of the mode, if there is one; one that does not ring has the assumed damping."""
-    rings = [p for p in dynamics_of(fit.model).poles if p.imag >= 0.0 and _damping(p) <= RINGS]
+    arx = dynamics_of(fit.model)
+    rings = [p for p in arx.poles if p.imag >= 0.0 and _damping(p) <= RINGS and _share(p, arx) >= VISIBLE]
     if ExtraResonance.name not in fit.model:
         if not rings:
             return []
-        order, line = dynamics_of(fit.model).poles.size, _frequency(min(rings, key=_damping), fit.model)
+        order, line = arx.poles.size, _frequency(max(rings, key=lambda p: _share(p, arx)), fit.model)
         said = f"the stage rings after steps; ARX of order {order} describes its samples better than a mode does"
         return [Notice("ringing", f"{said}; they ring at {line:.4g} Hz{_alike(line, fit.model)}")]
     mode = fit.model[ExtraResonance.name]
@@ -147,6 +150,14 @@ def mode_notices(fit: PieceFit) -> list[Notice]:
             "but its frequency, damping and share and the delay are not determined separately and have no intervals"
         )
     return [Notice("ringing", said)]
+
+
+def _share(pole: complex, arx: Arx) -> float:
+    """Amplitude of what a pole contributes to the response to a step, as a share of the step."""
+    away = np.delete(arx.poles, np.argmin(np.abs(arx.poles - pole)))
+    residue = np.polyval(arx.array("b")[::-1], 1.0 / pole) / np.prod(1.0 - away / pole)
+    pair = 2.0 if pole.imag > 0.0 else 1.0
+    return float(pair * abs(residue / (1.0 - pole) / arx.dc_gain))
 
 
 def _frequency(pole: complex, model: Model) -> float:

@@ -41,6 +41,11 @@ GROWTH = 6.0
 ALIKE = 0.97
 """If the cosine between the directions of two groups is larger, the present drive cannot distinguish the groups."""
 
+CANCELLED = 0.01
+"""Of the groups that the drive cannot distinguish, one is not named if an offset would have to cancel so much of its
+change that the share of its information that is left is smaller by this factor: under a sine of 20 Hz, the slow part
+moves almost only the mean."""
+
 OFFSET_SCORES = 50
 """Number of scores from which the offset of a new stream is estimated: the zero of the sensor may be another one."""
 
@@ -123,14 +128,18 @@ class ChangeDetector:
         seen = scatter.excited & (weights > 0.0)
         statistic = np.where(seen, gradients**2 / np.where(seen, weights * variance, 1.0), 0.0)
         at, largest = np.unravel_index(int(statistic.argmax()), statistic.shape)
-        candidates = seen[at] & (np.arange(len(GROUPS)) != _OFFSET)
+        candidates, metric = seen[at] & (np.arange(len(GROUPS)) != _OFFSET), _left_by_offset(sums[1][at])
         if largest == _OFFSET:  # a change of another group, beside the same offset, moves it, too
             gradients, weights, candidates = sums[0], np.diagonal(sums[1], axis1=1, axis2=2), seen[at]
-            variance = self._variance(scatter, weights, sums[1])
-        group = int(np.argmax(gradients[at] ** 2 / np.where(candidates, weights[at], np.inf)))
+            variance, metric = self._variance(scatter, weights, sums[1]), sums[1][at]
+        gains = gradients[at] ** 2 / np.where(candidates, weights[at], np.inf)
+        alike = _alike(int(gains.argmax()), metric)
+        left = np.diag(metric)[alike] / np.diag(sums[1][at])[alike]
+        alike = [k for k, share in zip(alike, left, strict=True) if share > CANCELLED * left.max()]
+        group = max(alike, key=lambda k: gains[k])
         return Change(
             float(statistic[at, largest]) / self._threshold(score.duration),
-            _alike(group, sums[1][at]),
+            tuple(GROUPS[k] for k in (group, *(k for k in alike if k != group))),
             float(gradients[at, group] / weights[at, group]),
             float(np.sqrt(variance[at, group] / weights[at, group])),
             self._window[-1 - int(at)][2],
@@ -181,12 +190,17 @@ class ChangeDetector:
         return max(self._thresholds[key] for key in classes)
 
 
-def _alike(group: int, weight: Array) -> tuple[str, ...]:
+def _alike(group: int, metric: Array) -> list[int]:
     """A group, and those that a sum of scores with this Fisher information (5, 5) cannot distinguish from it."""
-    size = np.sqrt(np.diag(weight))
-    cosine = np.abs(weight[group]) / np.where(size > 0.0, size, np.inf) / size[group]
-    others = [k for k in np.argsort(-cosine) if k != group and cosine[k] > ALIKE]
-    return (GROUPS[group], *(GROUPS[k] for k in others))
+    size = np.sqrt(np.maximum(np.diag(metric), 0.0))
+    cosine = np.abs(metric[group]) / np.where(size > 0.0, size, np.inf) / size[group]
+    return [group, *(int(k) for k in np.argsort(-cosine) if k != group and cosine[k] > ALIKE)]
+
+
+def _left_by_offset(information: Array) -> Array:
+    """Fisher information (5, 5) about the other groups if the offset is not known."""
+    along, known = information[_OFFSET], information[_OFFSET, _OFFSET]
+    return information - np.outer(along, along) / known if known > 0.0 else information
 
 
 def _apart_from_offset(direction: Array) -> Array:

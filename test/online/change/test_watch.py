@@ -49,8 +49,8 @@ SPAN = 4.2e-6
 TRAINED, WATCHED = 60.0, 30.0
 
 
-def sine(seconds, frequency=11.0, amplitude=2.5):
-    time = PERIOD * np.arange(round(seconds / PERIOD))
+def sine(seconds, frequency=11.0, amplitude=2.5, period=PERIOD):
+    time = period * np.arange(round(seconds / period))
     return 3.5 + amplitude * np.sin(2 * np.pi * frequency * time) * (time > 0.2)
 
 
@@ -58,14 +58,15 @@ def follow(drive, displacement, seed=0, baseline=None, noise=5e-4, model=MODEL):
     """The watch after a stream, and the largest statistic after the baseline."""
     rng = np.random.default_rng(seed)
     measured = displacement + noise * SPAN * rng.standard_normal(displacement.size)
-    predictor, watch = Predictor(PERIOD, model), ChangeWatch(3600.0, baseline)
+    period = model.sample_period
+    predictor, watch = Predictor(period, model), ChangeWatch(3600.0, baseline)
     largest = 0.0
     for first in range(0, drive.size - BLOCK + 1, BLOCK):
         part = slice(first, first + BLOCK)
-        if first == round(2.0 / PERIOD) and baseline is None:
+        if first == round(2.0 / period) and baseline is None:
             watch.take_baseline(TRAINED)
-        answer = predictor.predict(first, round(first * PERIOD * 1e9), drive[part], measured[part])
-        watch.add(drive[part], answer, predictor, round((first + BLOCK) * PERIOD * 1e9))
+        answer = predictor.predict(first, round(first * period * 1e9), drive[part], measured[part])
+        watch.add(drive[part], answer, predictor, round((first + BLOCK) * period * 1e9))
         largest = max(largest, watch.change.statistic)
     return watch, largest
 
@@ -175,6 +176,17 @@ def test_a_change_is_found_with_its_group_and_its_onset(group):
     assert watch.change.statistic > 1.0
     assert group in watch.change.groups
     assert abs(watch.since * 1e-9 - late * PERIOD) < 1.0
+
+
+def test_a_lag_is_not_named_slow_although_both_turn_a_fast_sine_by_a_quarter_of_a_cycle():
+    """The slow group is almost only the mean, and what it adds to a fast sine has the direction of a lag."""
+    fast, lag = replace(MODEL, sample_period=5e-4), 3e-6
+    drive = sine(TRAINED + 24.0, 20.0, period=5e-4)
+    y = run(fast, drive)
+    late = np.arange(y.size) > drive.size - round(WATCHED / 2 / 5e-4)
+    watch, _ = follow(drive, y - np.where(late, lag * np.gradient(y, 5e-4), 0.0), model=fast)
+    assert watch.change.groups == ("dynamics",)
+    assert abs(watch.change.estimate - lag) < 3.0 * watch.change.deviation
 
 
 def watched(period, seconds, block, *, change=np.inf, baseline=20.0):
