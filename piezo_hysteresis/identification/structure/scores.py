@@ -186,19 +186,17 @@ def judge(full: PieceFit, pieces: Sequence[RecordPiece], structures: Sequence[Mo
     structures : sequence of ModelStructure
         Structures to score.
     """
-    folds = folds_of(pieces)
     held = np.array([p.kind is Kind.HOLD for p in pieces if WEIGHTS[p.kind] > 0.0])
+    kept = [(mask, np.where(mask, 0.0, full.weights)) for mask in folds_of(pieces)]
+    others = [(mask, np.tensordot(w, full.matrices, 1) + full.prior) for mask, w in kept if w.any()]
     for structure in structures:
         free, fixed, low, high = _space(full, structure)
         whole = _solve(full.total, free, fixed, low, high)
         logs, steps = [], []
         if held.any():  # only holds show creep well, so they are not left out
             logs.append(_logs(full, whole, held, False))
-        for mask in folds:
-            weights = np.where(mask, 0.0, full.weights)
-            if not weights.any():
-                continue
-            step = _solve(np.tensordot(weights, full.matrices, 1) + full.prior, free, fixed, low, high)
+        for mask, total in others:
+            step = _solve(total, free, fixed, low, high)
             logs.append(_logs(full, step, mask, True))
             steps.append(step[: len(full.names)])
         numbers = len(full.names)
@@ -243,20 +241,15 @@ def _solve(total: Array, free: Array, fixed: Array, low: Array, high: Array) -> 
 
 def _logs(full: PieceFit, step: Array, mask: Mask, zero_free: bool) -> float:
     """Mean ln max(1, R²) of the pieces in `mask`; the zero of a run without fitted pieces is free."""
-    numbers, logs = len(full.names), []
-    zeros = np.arange(numbers, numbers + full.runs)
-    rest = full.matrices[~mask].sum(axis=0) if not mask.all() else np.zeros_like(full.matrices[0])
-    step = step.copy()
-    for z in zeros:
-        mine = np.flatnonzero(mask & (full.matrices[:, z, z] > 0.0))
-        if zero_free and mine.size and rest[z, z] <= 0.0:
-            total = full.matrices[mine].sum(axis=0)
+    numbers, step = len(full.names), step.copy()
+    own, counts = full.matrices[mask], np.diagonal(full.matrices, axis1=1, axis2=2)
+    for z in range(numbers, numbers + full.runs) if zero_free else ():
+        if counts[mask, z].any() and not counts[~mask, z].any():
+            row = own[:, z].sum(axis=0)
             step[z] = 0.0
-            step[z] = (total[z, -1] - total[z, :-1] @ step) / total[z, z]
-    for matrix in full.matrices[mask]:
-        square = matrix[-1, -1] - 2.0 * step @ matrix[:-1, -1] + step @ matrix[:-1, :-1] @ step
-        logs.append(np.log(max(1.0, float(square))))
-    return float(np.mean(logs))
+            step[z] = (row[-1] - row[:-1] @ step) / row[z]
+    ahead = np.append(-step, 1.0)  # the residual after this step
+    return float(np.mean(np.log(np.maximum(1.0, own @ ahead @ ahead))))
 
 
 def _is_of_high_order(model: Model, name: str) -> bool:
