@@ -92,7 +92,7 @@ def test_a_hidden_effect_is_named_and_its_gap_closes_on_unseen_records(case):
 
 def test_data_of_an_explicit_step_have_an_answer_on_request_only():
     simulated = recorded(Case("effect_free", (), 3, 5e-4, "explicit", layout=BRIEF))
-    library = [BY_NAME[n] for n in FEW]
+    library = [BY_NAME[n] for n in ("creep", "mains_hum")]
     found = diagnose(simulated, effects=library)
     assert found.conclusion is Conclusion.INSUFFICIENT_DATA
     assert "--explicit-step" in found.reason

@@ -21,12 +21,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, norm, t
 
 from .history import FleetHistory, ParameterSeries
 from .outliers import FAR
 
 Array = NDArray[np.float64]
+
+EFFICIENCY = 0.4
+"""Degrees of freedom of the median of variances, as a share of those of their mean."""
+ENOUGH = 4.0
+"""Fewest degrees of freedom with which the recordings of a fleet show how much those of one stage differ."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +46,7 @@ class ChangedStage:
         Medians over the earlier and over the later half of the recordings of the stage.
     distance : float
         |later − earlier| over the standard error of the difference of two recordings, which contains how much
-        recordings of one stage differ in this fleet.
+        recordings of one stage differ in this fleet; as deviations of a normal variable if few recordings show this.
     """
 
     stage: str
@@ -69,16 +74,28 @@ def _changed(history: FleetHistory, name: str, series: ParameterSeries) -> Itera
     known = ~np.isnat(time) & np.isfinite(errors)
     members = {str(stage): np.flatnonzero((owner == stage) & known) for stage in np.unique(owner)}
     halves = {s: (m[: m.size // 2], m[-(m.size // 2) :]) for s, m in members.items() if m.size > 1}
-    spread = _spread([value[half] for both in halves.values() for half in both])
+    scatter, freedom = _scatter([value[half] for both in halves.values() for half in both])
+    typical = float(np.median(errors[known])) if halves else 0.0
     for stage, both in halves.items():
         earlier, later = (float(np.median(value[half])) for half in both)
-        error = float(np.linalg.norm([np.hypot(np.median(errors[half]), spread) for half in both]))
-        distance = abs(later - earlier) / error if error > 0.0 else 0.0
+        sizes = np.array([np.median(errors[half]) for half in both])
+        if freedom >= ENOUGH and scatter > 0.0:  # an interval holds the error of form, which all recordings share
+            wider = np.maximum(1.0, sizes / typical) if typical > 0.0 else np.ones(2)
+            distance = _normal(abs(later - earlier) / (scatter * float(np.linalg.norm(wider))), freedom)
+        else:
+            error = float(np.linalg.norm([*sizes, scatter, scatter]))
+            distance = abs(later - earlier) / error if error > 0.0 else 0.0
         if distance > FAR:
             yield ChangedStage(stage, name, series.unit, earlier, later, distance)
 
 
-def _spread(halves: Sequence[Array]) -> float:
-    """Standard deviation between the recordings of one half: that of the median half, or 0 if none has several."""
+def _scatter(halves: Sequence[Array]) -> tuple[float, float]:
+    """Standard deviation between the recordings of one half, of the median half, and its degrees of freedom."""
     squares = [np.var(h, ddof=1) * (h.size - 1) / chi2.median(h.size - 1) for h in halves if h.size > 1]
-    return float(np.sqrt(np.median(squares))) if squares else 0.0
+    freedom = EFFICIENCY * sum(h.size - 1 for h in halves)
+    return (float(np.sqrt(np.median(squares))) if squares else 0.0), freedom
+
+
+def _normal(distance: float, freedom: float) -> float:
+    """The number of standard deviations of a normal variable that is as rare as a value of Student's t."""
+    return float(norm.isf(t.sf(distance, freedom)))

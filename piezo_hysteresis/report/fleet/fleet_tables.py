@@ -48,8 +48,8 @@ def change_table(changes: Sequence[ChangedStage]) -> Table | None:
     """The stages with a parameter that has changed, the largest change first."""
     note = (
         "Changed: the medians of the earlier and of the later half of the recordings differ by more than "
-        f"{FAR:g} standard errors of the difference of two recordings. The standard error combines the interval of a "
-        "recording and the spread of the recordings within the halves, which two recordings of a stage do not show."
+        f"{FAR:g} standard errors of the difference of two recordings. The standard error is the spread of the "
+        "recordings within the halves; in a small fleet, where it is hardly known, with the interval of a recording."
     )
     return _differences("Changed stages", ("earlier", "later"), [(c, c.earlier, c.later) for c in changes], note)
 

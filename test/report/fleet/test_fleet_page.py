@@ -109,6 +109,17 @@ def test_what_differs_from_day_to_day_is_no_change(seed):
     assert [c.stage for c in changed_stages(h)] == ["s2"]
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_change_is_found_that_is_smaller_than_the_error_of_form(seed):
+    """Intervals of ± 7 %, which all recordings have in common; they scatter by 0.5 %, and one stage falls by 5 %."""
+    h = history()
+    index = h.parameters["bouc_wen.A"].index
+    value = 1.0 + 0.005 * np.random.default_rng(seed).standard_normal(index.size)
+    value = np.where((h.stage == "s2") & (h.time > np.datetime64("2026-03-10")), 0.95 * value, value)
+    object.__setattr__(h, "parameters", {"x": ParameterSeries("1", index, value, value - 0.07, value + 0.07)})
+    assert [c.stage for c in changed_stages(h)] == ["s2"]
+
+
 def test_an_interval_that_a_bound_cuts_is_no_reason_for_a_change():
     """Two delays of 0 to 1 ms, both known within 1.1 ms: they differ by less than 1.3 standard errors of 0.56 ms."""
     value = np.where(np.arange(EACH * len(STAGES)) % EACH < EACH // 2, 0.1e-3, 1.1e-3)
