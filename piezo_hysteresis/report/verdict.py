@@ -20,6 +20,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..effects import CATALOGUE
 from ..identification.free_run_error import Errors
 from .figures.comparison import ModelComparison
 from .words import nanometre
@@ -144,6 +145,15 @@ def _conclusion(answer: Mapping[str, Any]) -> str:
     return "missing_effect" if answer["verdict"] == "named" else ""
 
 
+def _doubt(effect: Mapping[str, Any]) -> str:
+    """What cannot be distinguished from a named effect, and whether at least its family is certain."""
+    rivals = effect["confusable_with"]
+    words = " or ".join(name.replace("_", " ") for name in rivals)
+    said = f"The data cannot distinguish {effect['name'].replace('_', ' ')} from {words}"
+    families = {e.family for e in CATALOGUE if e.public_name() in rivals}
+    return f"{said}; the family ({effect['family']}) is certain." if families == {effect["family"]} else f"{said}."
+
+
 def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
     effects = answer.get("effects", ())
     found = [sentence(answer["reason"])] if answer.get("reason") else []
@@ -151,13 +161,7 @@ def _sentences(answer: Mapping[str, Any]) -> tuple[str, ...]:
         names = " and ".join(effect["name"].replace("_", " ") for effect in effects).capitalize()
         explain = "explain" if len(effects) > 1 else "explains"
         found.append(f"{names} {explain} {100 * effects[-1]['explained_fraction']:.0f} % of the gap.")
-    for effect in effects:
-        if not effect["member_certain"]:
-            twins = ", ".join(t.replace("_", " ") for t in effect["confusable_with"])
-            others = f": {twins} would explain the data equally well" if twins else ""
-            found.append(
-                f"The family of the effect ({effect['family']}) is certain, but not the member of the family{others}."
-            )
+    found += [_doubt(effect) for effect in effects if effect.get("confusable_with")]
     places = [place for place in answer.get("where", ()) if place.get("detail")]
     if places and answer["verdict"] != "nothing_missing":
         found.append(f"Most of the residual is here: {places[0]['detail'].rstrip('.')}.")

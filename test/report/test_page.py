@@ -29,6 +29,7 @@ import pytest
 from matplotlib.image import imread
 
 from piezo_hysteresis.discrepancy import Conclusion
+from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.errors import RecordingError
 from piezo_hysteresis.report.figures.diagnosis.correction import correction
 from piezo_hysteresis.report.page import SECTIONS
@@ -265,3 +266,25 @@ def test_tables_of_a_diagnosis_agree_with_its_answer(answer):
     assert rejection_table(answer).rows == (("thermal_drift", "loses <0.4> on held-out phases"),)
     empty = {"verdict": "nothing_missing", "effects": [], "where": [], "rejected": []}
     assert [t(empty) for t in (effect_table, gap_table, where_table, rejection_table)] == [None] * 4
+
+
+@pytest.mark.parametrize(
+    ("rivals", "said"),
+    [
+        ([], None),
+        (["creep"], "The data cannot distinguish thermal drift from creep."),
+        (["creep", "gain_drift"], "The data cannot distinguish thermal drift from creep or gain drift."),
+    ],
+)
+def test_a_rival_of_another_family_leaves_the_family_open(rivals, said):
+    drift = EFFECT | {"name": "thermal_drift", "family": "drift", "confusable_with": rivals}
+    answer = {"verdict": "named", "reason": "Drift.", "effects": [drift | {"member_certain": not rivals}]}
+    assert [s for s in answer_verdict(answer).sentences if "distinguish" in s] == ([said] if said else [])
+
+
+def test_a_rival_of_the_same_family_leaves_only_the_member_open():
+    drift = next(e for e in CATALOGUE if e.name == "thermal_drift")
+    same = [e.public_name() for e in CATALOGUE if e.family == drift.family and e is not drift][:1]
+    found = EFFECT | {"name": drift.name, "family": drift.family, "confusable_with": same}
+    sentences = answer_verdict({"verdict": "named", "reason": "Drift.", "effects": [found]}).sentences
+    assert any(s.endswith(f"; the family ({drift.family}) is certain.") for s in sentences)
