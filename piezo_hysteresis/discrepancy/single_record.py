@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -72,39 +72,17 @@ ONLY_A_LAG = (
 """What is said of a resonance that the dynamics of the published model could contain."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Start:
-    """The models before the search: the published or the given one, fitted jointly in `setup`, and the one to extend.
-
-    `model` has the structure that predicts best (`found`), unless a model was given or the time was over before.
-    `short` are the records of the search, with their floors [m].
-    """
-
-    setup: BaselineSetup
-    model: Model
-    found: Identification | None
-    in_time: bool
-    short: tuple[Record, ...]
-    short_floors: Array
-    has_several_drives: bool
-
-    @property
-    def leaves_gap(self) -> bool:
-        """Whether the error of the published model is above its floor."""
-        return self.setup.score.excess > ADEQUATE
-
-
 def diagnose_few(state: DiagnosisState) -> Diagnosis:
     """Extend the best model while cross-validation improves, and name the effects that are certain.
 
     Without a given model, one is identified from the prepared records.
     """
     given, experiment = state.model, state.experiment
-    start = _start(state)
-    setup = start.setup
+    setup, model, found = _start(state)
+    several = has_several_drives(setup.records, setup.fitted)
     state.progress("location of the residual", 0.5)
     where = located(setup.baseline.model, setup.records, setup.fitted, setup.least.tolist(), offset=True)
-    selection, fit, is_certain = _extended(state, start)
+    selection, fit, is_certain = _extended(state, setup, model, found, several)
     state.progress("gap", 0.9)
     first, final = given or setup.baseline.model, selection.model  # the gap of a given model is that before any refit
     gap = gap_between(first, final, setup, setup.tested, offset=True)
@@ -114,9 +92,8 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
             gap = replace(gap, refitted=fitted)
     shown = {s.best.effect.public_name() for s in selection.accepted}
     missing = missing_excitation(setup.records, setup.usable, shown)
-    origin = CHOSEN if start.found else KEPT if fit is None else REFITTED
-    count, several = len(setup.usable), start.has_several_drives
-    said = conclusion_of_few(selection, is_certain, setup.score, gap, count, several, missing, origin)
+    origin = CHOSEN if found else KEPT if fit is None else REFITTED
+    said = conclusion_of_few(selection, is_certain, setup.score, gap, len(setup.usable), several, missing, origin)
     if said[0] is Conclusion.MISSING_EFFECT and given is None and ExtraResonance.name in shown:
         said = said[0], said[1] + ("" if roles_of(experiment).broadband else ONLY_A_LAG)
     everywhere = None
@@ -136,81 +113,89 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     )
 
 
-def _start(state: DiagnosisState) -> _Start:
-    """Identify the models if none was given, and fit the published or the given one jointly."""
+def _start(state: DiagnosisState) -> tuple[BaselineSetup, Model, Identification | None]:
+    """The published or the given model, fitted jointly in the setup; the model to extend; and where it comes from.
+
+    The model to extend has the structure that predicts best, unless a model was given or the time was over before.
+    """
     experiment, used, progress = state.experiment, state.moving, state.progress
     records = experiment.records
     aside = choose_test_records(records, used) if len(used) >= FEWEST_RECORDS else ()
     fitted = [i for i in used if i not in aside]
     progress("baseline", 0.1)
-    published, found, in_time = state.model, None, True
+    published, found = state.model, None
     if published is None:  # which records are not fitted was decided above
         known = as_conditioning(experiment, aside)
         published = identify(known, held_out=(), progress=lambda word, part: progress(word, 0.1 + 0.1 * part)).model
-        try:
-            with ending_at(state.end):
-                found = identify(known, held_out=(), memory=True, progress=lambda w, f: progress(w, 0.2 + 0.3 * f))
-        except TimeSpentError:
-            in_time = False
+        with suppress(TimeSpentError), ending_at(state.end):
+            found = identify(known, held_out=(), memory=True, progress=lambda w, f: progress(w, 0.2 + 0.3 * f))
     model, noise = found.model if found else published, noise_floors(records)
-    short = shortened(records, SEARCHED)
-    quiet = noise_of_averages(noise, records, short)
-    least = floors(short, quiet)
+    short, quiet, least = _short(records, noise)
     data = training_data_of(short, fitted, quiet, least, model)
     baseline = joint(with_zero(published), data, LAST, SHARP)
     score, lost = score_model(baseline.model, data, baseline.linearised), [np.zeros(r.size) for r in records]
     whole, span = floors(records, noise), experiment.range
-    setup = BaselineSetup(records, records, lost, noise, whole, span, used, fitted, aside, data, baseline, score)
-    start = _Start(setup, model, found, in_time, short, least, has_several_drives(records, fitted))
-    if start.leaves_gap:
+    if score.excess > ADEQUATE:
         start_helpers()  # effects will be searched for
-    return start
+    setup = BaselineSetup(records, records, lost, noise, whole, span, used, fitted, aside, data, baseline, score)
+    return setup, model, found
 
 
-def _extended(state: DiagnosisState, start: _Start) -> tuple[Selection, Fit | None, bool]:
+def _short(records: Sequence[Record], noise: Array) -> tuple[tuple[Record, ...], Array, Array]:
+    """The records of the search, their noise, and their floors [m]."""
+    short = shortened(records, SEARCHED)
+    quiet = noise_of_averages(noise, records, short)
+    return short, quiet, floors(short, quiet)
+
+
+def _extended(
+    state: DiagnosisState, setup: BaselineSetup, model: Model, found: Identification | None, several: bool
+) -> tuple[Selection, Fit | None, bool]:
     """The effects of the structure and further ones, the fit of the saved model, and whether the structure is certain.
 
-    There is no fit if a given model is saved.
+    `several` says whether the records have several drives. There is no fit if a given model is saved.
     """
-    found, setup, data = start.found, start.setup, start.setup.training_data
-    now, score = (found.fit, score_model(start.model, data)) if found else (setup.baseline, setup.score)
+    data = setup.training_data
+    now, score = (found.fit, score_model(model, data)) if found else (setup.baseline, setup.score)
     steps: list[Step] = []
-    if found and start.leaves_gap and start.has_several_drives:
-        short_floors = start.short_floors.tolist()
-        steps = structure_steps(found, setup.score, data, start.short, short_floors, setup.fitted)
+    if found and setup.score.excess > ADEQUATE and several:
+        short, _, least = _short(setup.records, setup.noise)
+        steps = structure_steps(found, setup.score, data, short, least.tolist(), setup.fitted)
     is_certain = bool(steps)
     fitting = [e for e in state.effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
     with ending_at(state.end):
         more = select(now.model, data, score, fitting, lambda w, f: state.progress(w, 0.6 + 0.3 * f))
     extended = more.accepted[-1].best.fit if more.accepted else None
     contenders = [] if found else [now]
-    enough = len(setup.usable) >= FEWEST_RECORDS and start.has_several_drives
+    enough = len(setup.usable) >= FEWEST_RECORDS and several
     if extended is not None and (enough or not is_certain):  # few records show no effect beside a certain one
         contenders.append(extended)
-    best = _best(start, contenders, LEADS if is_certain else EXTENDS)
+    best = _best(setup, model, found, contenders, LEADS if is_certain else EXTENDS)
     if best is not None and best is extended:
         steps, score = [*steps, *more.steps], more.score
     else:
         steps += [replace(s, accepted=False) for s in more.steps]
-    final = start.model if best is None else best.stated_model
-    in_time = start.in_time and more.in_time
+    final = model if best is None else best.stated_model
+    in_time = more.in_time and (found is not None or state.model is not None)
     selection = Selection(setup.baseline.model, final, score, tuple(steps), more.null, in_time)
     return selection, best or (found.fit if found else None), is_certain
 
 
-def _best(start: _Start, contenders: Sequence[Fit], lead: float) -> Fit | None:
-    """The fit that predicts rates, amplitudes and records left out best, by `lead`; None if the start stays.
+def _best(
+    setup: BaselineSetup, model: Model, found: Identification | None, contenders: Sequence[Fit], lead: float
+) -> Fit | None:
+    """The fit that predicts rates, amplitudes and records left out best, by `lead`; None if the model stays.
 
     A model that diverges on a test record is not taken.
     """
-    best, setup = None, start.setup
+    best = None
     judged = setup.records, setup.least.tolist(), setup.fitted
-    reached = score_left_out(start.model, *judged, adjusts=start.found is not None) if contenders else 0.0
+    reached = score_left_out(model, *judged, adjusts=found is not None) if contenders else 0.0
     for contender in contenders:
-        model = contender.stated_model
+        extended = contender.stated_model
         with suppress(PiezoError):
-            score = score_left_out(model, *judged)
-            model.free_run([setup.records[i] for i in with_conditioning(setup.records, setup.tested)])
+            score = score_left_out(extended, *judged)
+            extended.free_run([setup.records[i] for i in with_conditioning(setup.records, setup.tested)])
             if score < reached - lead:
                 best, reached = contender, score
     return best
