@@ -29,7 +29,7 @@ from ..record import Experiment
 from .choice.time_to_decide import Separation
 from .gap import Gap, gap_answer
 from .localise import ResidualShare
-from .search.selection_result import Rejection, Selection
+from .search.selection_result import Selection
 from .unnamed.correction import Correction
 from .verdict import Conclusion, Verdict
 
@@ -98,19 +98,17 @@ class Diagnosis(Pictured):
         return tuple(s.best.effect.public_name() for s in self.selection.accepted)
 
     @property
-    def rejected(self) -> tuple[Rejection, ...]:
-        """Effects that were not named, each once, with the reason given in the last step."""
+    def rejected(self) -> dict[str, str]:
+        """Effects that were not named, by name, with the reason given in the last step."""
+        reasons: dict[str, str] = {}
         if self.selection is None:
-            return ()
-        rejections: dict[str, Rejection] = {}
+            return reasons
         for step in self.selection.steps:
             if self.verdict is Verdict.UNKNOWN and step.accepted:
-                name = step.best.name
-                rejections[name] = Rejection(name, self._why_unnamed(name, self.selection))
-            for rejection in step.rejected:
-                rejections[rejection.name] = rejection
+                reasons[step.best.name] = self._why_unnamed(step.best.name, self.selection)
+            reasons.update(step.rejected)
         forms = {e.name for e in CHAIN if e.public_name() in self.names}
-        return tuple(r for r in rejections.values() if r.name not in forms)
+        return {name: reason for name, reason in reasons.items() if name not in forms}
 
     def _why_unnamed(self, name: str, selection: Selection) -> str:
         """Why an effect is not named that the search added."""
@@ -162,7 +160,7 @@ class Diagnosis(Pictured):
             "effects": self.effects(),
             "where": [{"axis": p.axis, "share": round(p.share, 4), "detail": p.detail} for p in self.where],
             "gap_percent_of_range": gap_answer(self.gap),
-            "rejected": [asdict(r) for r in self.rejected],
+            "rejected": [{"name": name, "reason": reason} for name, reason in self.rejected.items()],
             "next_experiment": None if self.next_experiment is None else self.next_experiment.answer(),
             "data_quality": [asdict(n) for n in self.experiment.notices],
             "unnamed_correction": None if self.correction is None else self.correction.answer(),

@@ -156,7 +156,8 @@ def unnamed_conclusion(selection: Selection, falls: bool, gap: Gap) -> tuple[Con
         first = selection.steps[0]
         closest = " with ".join(accepted) or first.best.effect.public_name()
         share = 100 * selection.explained(selection.score if accepted else first.best.score)
-        why = "".join(f" ({r.reason})" for r in first.rejected if r.name == first.best.name)
+        reason = first.rejected.get(first.best.name)
+        why = f" ({reason})" if reason else ""
         message = f"; the closest effect is {closest}, which explains {share:.0f} % of the gap{why}"
     return Conclusion.UNEXPLAINED_GAP, f"Something is missing that no effect of the catalogue explains{message}."
 

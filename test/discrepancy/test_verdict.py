@@ -47,7 +47,7 @@ def selection(explained, leaves):
         Score(np.full(10, np.sqrt(v)), np.zeros(1)) for v in (1.0 + (leaves - 1.0) / (1.0 - explained) ** 2, leaves)
     )
     fitted = Fit(STAGE.with_effect(Creep()), (), np.empty((0, 0)), leaves, (), (), (), True, 1)
-    step = Step(before, FittedCandidate(Creep(), EVIDENCE, after, fitted), True, (), ())
+    step = Step(before, FittedCandidate(Creep(), EVIDENCE, after, fitted), True, (), {})
     return Selection(STAGE, STAGE, after, (step,), 1.0)
 
 
@@ -84,7 +84,7 @@ def with_hum(first, share):
     after = Score(np.sqrt(1.0 + (1.0 - share) ** 2 * (step.before.ratios**2 - 1.0)), np.zeros(1))
     model = step.best.fit.model.with_effect(MainsHum())
     hum = FittedCandidate(MainsHum(), EVIDENCE, after, replace(step.best.fit, model=model))
-    return replace(first, model=model, score=after, steps=(step, Step(step.best.score, hum, True, (), ())))
+    return replace(first, model=model, score=after, steps=(step, Step(step.best.score, hum, True, (), {})))
 
 
 def test_no_effect_of_several_is_said_to_explain_nothing():

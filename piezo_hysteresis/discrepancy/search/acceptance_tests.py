@@ -26,7 +26,6 @@ from ...identification.records.noise_floor import ADEQUATE, stroke
 from .candidate_refits import LEAST_GAIN
 from .candidates import FittedCandidate
 from .refit import without
-from .selection_result import Rejection
 
 SHOWN = 0.005
 """Smallest gain that a number with two decimals shows."""
@@ -43,23 +42,23 @@ PEAKS = 3.0
 """Standard deviations that noise hardly exceeds."""
 
 
-def first_rejection(best: FittedCandidate, before: Score) -> Rejection | None:
+def first_rejection(best: FittedCandidate, before: Score) -> str | None:
     """First reason to reject a fitted candidate; None if it passes all tests. The cheap tests come first."""
     gain = before.cost - best.score.cost
     if gain < LEAST_GAIN:
         lowers = f"lowers mean ln R² by {_below(gain)}" if gain >= SHOWN else "does not lower mean ln R²"
-        return Rejection(best.name, f"in cross-validation it {lowers}, and a decrease by {LEAST_GAIN:g} is needed")
+        return f"in cross-validation it {lowers}, and a decrease by {LEAST_GAIN:g} is needed"
     if best.name == MainsHum.name and not is_steady(best, before):
-        return Rejection(best.name, "its amplitude depends on the drive, which mains hum does not")
+        return "its amplitude depends on the drive, which mains hum does not"
     if not exceeds_voltage_noise(best):
-        return Rejection(best.name, "it changes the voltage no more than the noise with which it was measured")
+        return "it changes the voltage no more than the noise with which it was measured"
     alone = without(best)
     owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
     if owed < LEAST_GAIN:
         gains = f"gains only {_below(owed)} of the {LEAST_GAIN:g} that are needed" if owed >= SHOWN else "gains nothing"
-        return Rejection(best.name, f"it {gains} over the model that was refitted without it")
+        return f"it {gains} over the model that was refitted without it"
     if before.excess <= ADEQUATE and not is_certain(best):
-        return Rejection(best.name, "the error is at the floor, and its interval does not exclude that it is absent")
+        return "the error is at the floor, and its interval does not exclude that it is absent"
     return None
 
 

@@ -28,7 +28,7 @@ from .acceptance_tests import FAR, is_certain
 from .candidate_refits import LEAST_GAIN, best_of_each, leaves_room, settled, simplest
 from .candidates import FittedCandidate, screen
 from .refit import LATER, Fitted, collected, converged, refit, without
-from .selection_result import Rejection, Step
+from .selection_result import Step
 
 
 def certain(steps: Sequence[Step]) -> list[Step]:
@@ -46,27 +46,28 @@ def certain(steps: Sequence[Step]) -> list[Step]:
             precise = replace(accepted[-1], best=converged(accepted[-1].best))
             kept, is_precise = [*accepted[:-1], precise, *kept[len(accepted) :]], True
             continue
-        step, rejected = found
+        step, reason = found
         if step is accepted[-1]:
-            kept = [*accepted[:-1], replace(step, accepted=False, rivals=(), rejected=(rejected, *step.rejected))]
+            rejected = {step.best.name: reason, **step.rejected}
+            kept = [*accepted[:-1], replace(step, accepted=False, rivals=(), rejected=rejected)]
             continue
-        fewer = _taken_back(step, accepted, without(_beside_newest(step, accepted)), rejected)
+        fewer = _taken_back(step, accepted, without(_beside_newest(step, accepted)), reason)
         if fewer is None:
             break
         kept = [*fewer, *kept[len(accepted) :]]
     return kept
 
 
-def _possibly_absent(accepted: Sequence[Step]) -> tuple[Step, Rejection] | None:
-    """The newest step whose effect may be absent by its interval, and the rejection; None if there is none."""
+def _possibly_absent(accepted: Sequence[Step]) -> tuple[Step, str] | None:
+    """The newest step whose effect may be absent by its interval, and this reason; None if there is none."""
     for step in reversed(accepted):
         if not is_certain(_beside_newest(step, accepted)):
-            return step, Rejection(step.best.name, "its interval does not exclude that it is absent")
+            return step, "its interval does not exclude that it is absent"
     return None
 
 
-def _outweighed(accepted: Sequence[Step]) -> tuple[Step, Rejection] | None:
-    """The step whose effect explains least, if it explains less than a large error that remains, and the rejection.
+def _outweighed(accepted: Sequence[Step]) -> tuple[Step, str] | None:
+    """The step whose effect explains least, if it explains less than a large error that remains, and this reason.
 
     Such an error is one of form, and the effect may only imitate a part of it.
     """
@@ -78,7 +79,7 @@ def _outweighed(accepted: Sequence[Step]) -> tuple[Step, Rejection] | None:
     least = min(left, key=lambda step: left[step], default=None)
     if least is None or left[least] > 2.0 * remains:
         return None
-    return least, Rejection(least.best.name, "beside the others, it explains less of the error than what remains of it")
+    return least, "beside the others, it explains less of the error than what remains of it"
 
 
 def needed(accepted: Sequence[Step]) -> list[Step]:
@@ -93,7 +94,7 @@ def needed(accepted: Sequence[Step]) -> list[Step]:
         if alone is None or alone.score.cost - newest.score.cost >= LEAST_GAIN:
             continue
         reason = f"beside {newest.name}, its interval does not exclude that it is absent"
-        steps = _taken_back(step, steps, alone, Rejection(earlier.name, reason)) or steps
+        steps = _taken_back(step, steps, alone, reason) or steps
     return steps
 
 
@@ -125,7 +126,7 @@ def _beside_newest(step: Step, accepted: Sequence[Step]) -> FittedCandidate:
     return replace(newest, effect=newest.fit.model[step.best.name])
 
 
-def _taken_back(step: Step, accepted: Sequence[Step], alone: Fitted | None, rejected: Rejection) -> list[Step] | None:
+def _taken_back(step: Step, accepted: Sequence[Step], alone: Fitted | None, reason: str) -> list[Step] | None:
     """The accepted steps without an earlier one, from the newest model without its effect; None without a fit."""
     newest = accepted[-1].best
     if alone is None:
@@ -137,5 +138,5 @@ def _taken_back(step: Step, accepted: Sequence[Step], alone: Fitted | None, reje
     place = steps.index(step)
     steps[place + 1] = replace(steps[place + 1], before=step.before)
     del steps[place]
-    steps[-1] = replace(steps[-1], best=best, rejected=(*steps[-1].rejected, rejected))
+    steps[-1] = replace(steps[-1], best=best, rejected={**steps[-1].rejected, step.best.name: reason})
     return steps

@@ -45,7 +45,7 @@ from .candidate_refits import (
 from .candidates import Candidate, FittedCandidate, screen
 from .earlier_effects import certain, in_best_laws, needed
 from .refit import Fitted, converged, without
-from .selection_result import Rejection, Selection, Step
+from .selection_result import Selection, Step
 from .training_data import TrainingData
 
 REFITS = 6
@@ -123,57 +123,51 @@ def _turn(
     screened = screen(
         model, training_data, [e for e in effects if e.public_name() not in present and e.name not in twins]
     )
-    refits, best, rejection = _best_effect(model, screened, before, progress)
+    refits, best, reason = _best_effect(model, screened, before, progress)
     if best is None:
         return None
-    rejection = rejection or _untried_twin(type(best.effect), effects)
+    reason = reason or _untried_twin(type(best.effect), effects)
     gain = before.cost - best.score.cost
-
-    def is_rival(candidate: FittedCandidate) -> bool:
-        lead, error = best.score.better_than(candidate.score)
-        return rejection is None and lead < CLOSE * gain and lead < 2.0 * error
-
-    def behind(candidate: FittedCandidate) -> Rejection:
-        lead, error = best.score.better_than(candidate.score)
-        message = f"in cross-validation its mean ln R² is {lead:.2f} ± {error:.2f} higher than with {best.name}"
-        return Rejection(candidate.name, message)
-
-    def not_refitted(candidate: Candidate) -> Rejection:
-        most = max(0.0, before.cost - candidate.score.cost)
-        message = (
+    rivals = list[FittedCandidate]()
+    rejected = {name: f"on slow drive it equals {t}, which is in the model" for name, t in twins.items()}
+    if reason is not None:
+        rejected[best.name] = reason
+    for fitted in (c for c in refits if c.name != best.name):
+        lead, error = best.score.better_than(fitted.score)
+        if reason is None and lead < CLOSE * gain and lead < 2.0 * error:
+            rivals.append(fitted)
+        else:
+            rejected[fitted.name] = (
+                f"in cross-validation its mean ln R² is {lead:.2f} ± {error:.2f} higher than with {best.name}"
+            )
+    others = [c for c in screened if all(c.name != r.name for r in refits)]
+    for other in others:
+        most = max(0.0, before.cost - other.score.cost)
+        rejected[other.name] = (
             f"it is predicted to lower mean ln R² by at most {most:.2f}, where {best.name} lowers it by {gain:.2f}"
         )
-        return Rejection(candidate.name, message)
-
-    fitted = [c for c in refits if c.name != best.name]
-    rivals = tuple(filter(is_rival, fitted))
-    others = [c for c in screened if all(c.name != r.name for r in refits)]
-    rejected = [Rejection(name, f"on slow drive it equals {t}, which is in the model") for name, t in twins.items()]
-    rejected += [] if rejection is None else [rejection]
-    rejected += [behind(c) for c in fitted if c not in rivals]
-    rejected += map(not_refitted, others)
-    return Step(before, best, rejection is None, rivals, tuple(rejected), (*refits, *others))
+    return Step(before, best, reason is None, tuple(rivals), rejected, (*refits, *others))
 
 
 def _best_effect(
     model: Model, screened: Sequence[Candidate], before: Score, progress: Progress
-) -> tuple[list[FittedCandidate], FittedCandidate | None, Rejection | None]:
-    """Refits of the best candidates, the best of them, and the rejection of its effect or None."""
+) -> tuple[list[FittedCandidate], FittedCandidate | None, str | None]:
+    """Refits of the best candidates, the best of them, and why its effect is rejected or None."""
     best: FittedCandidate | None = None
-    rejection: Rejection | None = None
+    reason: str | None = None
     refits = best_of_each(refit_candidates(model, _worth_a_refit(screened, before), before, progress))
     if refits:
         relatives = refits_of_relatives(screened, refits[0], before)
         refits = best_of_each([*refits, *relatives, *refits_of_creep(model, screened, refits[0])])
-        best, rejection = _judged(refits, before)
+        best, reason = _judged(refits, before)
     tried = screened
-    if best is not None and rejection is None:  # a fit that leaves an error may have ended in another minimum
+    if best is not None and reason is None:  # a fit that leaves an error may have ended in another minimum
         same = best.effect.public_name() if best.score.excess > ADEQUATE else None
         tried = [c for c in screened if c.effect.public_name() == same]
     if late := refits_behind_new_dynamics(model, tried, before):
         refits = best_of_each([*refits, *late])
-        best, rejection = _judged(refits, before)
-    return refits, best, rejection
+        best, reason = _judged(refits, before)
+    return refits, best, reason
 
 
 def _worth_a_refit(screened: Sequence[Candidate], before: Score) -> Sequence[Candidate]:
@@ -182,16 +176,15 @@ def _worth_a_refit(screened: Sequence[Candidate], before: Score) -> Sequence[Can
     return best if before.excess > ADEQUATE else [c for c in best if before.cost - c.score.cost >= LEAST_GAIN]
 
 
-def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> Rejection | None:
-    """Rejection of an effect whose twin is not among the candidates, because the data cannot distinguish the two."""
+def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> str | None:
+    """Why an effect is rejected whose twin, which the data cannot distinguish from it, is not among the candidates."""
     twins = {e.public_name() for e in CATALOGUE if effect.is_twin_of(e)}
-    for untried in sorted(twins - {e.public_name() for e in effects}):
-        return Rejection(effect.name, f"on slow drive it equals {untried}, which was not among the candidates")
-    return None
+    untried = sorted(twins - {e.public_name() for e in effects})
+    return f"on slow drive it equals {untried[0]}, which was not among the candidates" if untried else None
 
 
-def _judged(refits: list[FittedCandidate], before: Score) -> tuple[FittedCandidate, Rejection | None]:
-    """The best refit, and the rejection of its effect or None."""
+def _judged(refits: list[FittedCandidate], before: Score) -> tuple[FittedCandidate, str | None]:
+    """The best refit, and why its effect is rejected or None."""
     best = finest(simplest(refits), before)
     if before.excess <= ADEQUATE:  # its interval decides
         best = converged(best)

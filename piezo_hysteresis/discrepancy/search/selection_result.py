@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,14 +29,6 @@ from .training_data import TrainingData
 
 MANY = 8
 """Number of records from which the worst one is ignored in the explained share."""
-
-
-@dataclass(frozen=True, slots=True)
-class Rejection:
-    """An effect that was not added, and the reason."""
-
-    name: str
-    reason: str
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -52,8 +45,8 @@ class Step:
         Whether the effect was added.
     rivals : tuple of FittedCandidate
         Refits that cross-validation cannot distinguish from the best.
-    rejected : tuple of Rejection
-        All other effects.
+    rejected : mapping of str to str
+        All other effects, by name, and why each was not added.
     tried : tuple of Candidate
         Every effect of this step with its score, refitted or, if it was too far behind, linearised at its start.
     """
@@ -62,7 +55,7 @@ class Step:
     best: FittedCandidate
     accepted: bool
     rivals: tuple[FittedCandidate, ...]
-    rejected: tuple[Rejection, ...]
+    rejected: Mapping[str, str]
     tried: tuple[Candidate, ...] = ()
 
     @property

@@ -100,7 +100,7 @@ def structure_steps(
         model = reduce(_without, names[k:], found.model)
         with suppress(PiezoError):
             best = candidate(name, refitted(model) if names[k:] else found.fit)
-            steps.append(Step(before, best, True, rivals(name), ()))
+            steps.append(Step(before, best, True, rivals(name), {}))
             before = best.score
     return steps
 

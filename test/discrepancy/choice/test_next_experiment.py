@@ -69,7 +69,7 @@ def rivals(period, *effects):
     for effect in effects:
         fit = Fit(stage.with_effect(effect), (), np.empty((0, 0)), 1.0, (), (), (), True, 1)
         fitted.append(FittedCandidate(effect, data, same, fit))
-    step = Step(Score(np.full(1, 9.0), np.zeros(1)), fitted[0], True, tuple(fitted[1:]), ())
+    step = Step(Score(np.full(1, 9.0), np.zeros(1)), fitted[0], True, tuple(fitted[1:]), {})
     return Selection(stage, fitted[0].fit.model, same, (step,), 1.0), data
 
 

@@ -78,7 +78,7 @@ def turn(before, *tried):
     candidates = [Candidate(effect(), DATA, score(ratios)) for effect, ratios in tried]
     best = min(candidates, key=lambda c: c.score.cost)
     fitted = FittedCandidate(best.effect, DATA, best.score, Fit(STAGE, (), np.empty((0, 0)), 1.0, (), (), (), True, 1))
-    return Step(score(before), fitted, True, (), (), (fitted, *(c for c in candidates if c is not best)))
+    return Step(score(before), fitted, True, (), {}, (fitted, *(c for c in candidates if c is not best)))
 
 
 @given(RATIOS, RATIOS, RATIOS, RATIOS)

@@ -99,7 +99,7 @@ def steps_with(order, hidden):
     for effect in order:
         best = refit(model, Candidate(effect, data, before), LATER)
         assert best is not None
-        steps.append(Step(before, best, True, (), ()))
+        steps.append(Step(before, best, True, (), {}))
         model, before = best.fit.model, best.score
     return steps
 
@@ -113,14 +113,14 @@ def test_an_effect_that_a_later_one_makes_superfluous_is_taken_back(hidden):
     assert kept[-1].best.score.excess < ADEQUATE
     assert kept[0].before is steps[0].before
     assert (DRIFT.name in kept[-1].best.fit.model) is (DRIFT in hidden)
-    assert [r.name for r in kept[-1].rejected] == ([] if DRIFT in hidden else [DRIFT.name])
+    assert list(kept[-1].rejected) == ([] if DRIFT in hidden else [DRIFT.name])
 
 
 def test_two_effects_that_a_later_one_makes_superfluous_are_taken_back():
     """The step after the first one had become another one, and `piezo diagnose` ended with a ValueError."""
     (kept,) = needed(steps_with((DRIFT, EvenInputPolynomial(), CREEP), (CREEP,)))
     assert kept.best.name == CREEP.name and kept.best.score.excess < ADEQUATE
-    assert {r.name for r in kept.rejected} == {DRIFT.name, EvenInputPolynomial.name}
+    assert set(kept.rejected) == {DRIFT.name, EvenInputPolynomial.name}
 
 
 def test_no_effect_is_named_beside_later_ones_if_its_interval_does_not_exclude_that_it_is_absent():
@@ -128,7 +128,7 @@ def test_no_effect_is_named_beside_later_ones_if_its_interval_does_not_exclude_t
     (kept,) = certain(steps_with((DRIFT, CREEP), (CREEP,)))
     assert kept.accepted and kept.best.name == CREEP.name
     assert DRIFT.name not in kept.best.fit.model
-    assert [r.name for r in kept.rejected] == [DRIFT.name]
+    assert list(kept.rejected) == [DRIFT.name]
 
 
 @pytest.mark.parametrize("first", [True, False])
@@ -139,7 +139,7 @@ def test_an_effect_that_explains_less_than_a_large_error_that_remains_is_not_nam
     assert steps[-1].best.score.excess > FAR
     kept = certain(steps)
     assert [step.best.name for step in kept if step.accepted] == [DRIFT.name]
-    assert [r.name for step in kept for r in step.rejected] == [CREEP.name]
+    assert [name for step in kept for name in step.rejected] == [CREEP.name]
 
 
 def test_a_fit_that_stopped_early_refuses_no_effect():
