@@ -94,26 +94,19 @@ def is_steady(hum: FittedCandidate, before: Score) -> bool:
     Hum is free in every record, also in those that cross-validation leaves out. It can take up what another effect
     leaves at the mains frequency and its harmonics, in the records whose drive moves at them.
     """
-    data = hum.training_data
+    data, frequency = hum.training_data, hum.effect["f"]
     lines = 2 * data.free_with(hum.fit.model).harmonics
     powers = np.array([0.5 * np.sum(free[-lines:] ** 2) for free in hum.fit.nuisances])
-    shown = np.array(_resolve(hum))
+    counted = np.isfinite(data.floors)
+    shown = counted & [  # long and fast enough to show hum
+        r.duration * frequency >= PERIODS and r.sample_period * frequency <= RESOLVED for r in data.records
+    ]
     if np.sum(shown) < FEWEST:
         return True
-    counted = np.isfinite(data.floors)
     kept = shown[counted]
     left = data.floors[shown] ** 2 * np.exp(hum.score.logs[kept])
     owed = np.log1p(np.quantile(powers[shown], 0.25) / left)
     return bool(np.mean(owed) > STEADY * np.mean((before.logs - hum.score.logs)[kept]))
-
-
-def _resolve(hum: FittedCandidate) -> list[bool]:
-    """Whether each record is long enough and fast enough to show hum."""
-    data, frequency = hum.training_data, hum.effect["f"]
-    return [
-        bool(np.isfinite(floor)) and r.duration * frequency >= PERIODS and r.sample_period * frequency <= RESOLVED
-        for r, floor in zip(data.records, data.floors, strict=True)
-    ]
 
 
 def exceeds_voltage_noise(candidate: FittedCandidate) -> bool:

@@ -75,10 +75,11 @@ def _replaced(before: list[FittedCandidate], after: list[FittedCandidate]) -> li
 def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], before: Score) -> list[FittedCandidate]:
     """Refits of effects of the drive and the loop that the dynamics have absorbed, so that no score test shows them.
 
-    At the floor, what remains is small, and the dynamics absorb only a lag.
+    They act before the dynamics, which can imitate them, so that the cost has several minima. At the floor, what
+    remains is small, and the dynamics absorb only a lag.
     """
-    is_far = before.excess > ADEQUATE
-    bending = [c for c in candidates if _bends_dynamics(c) and (is_far or c.effect.family == LAG)]
+    before_dynamics = [c for c in candidates if c.effect.place is ChainPosition.DRIVE or c.effect.host is not None]
+    bending = [c for c in before_dynamics if before.excess > ADEQUATE or c.effect.family == LAG]
     return collected(partial(settled, before=before), collected(partial(from_all_starts, model), bending))
 
 
@@ -92,12 +93,6 @@ def refits_of_creep(model: Model, candidates: Sequence[Candidate], best: FittedC
         return []
     usual = [replace(c, effect=c.effect.with_values(gamma=CREEP)) for c in candidates if c.name == Creep.name]
     return collected(partial(refit_anew, model), usual)
-
-
-def _bends_dynamics(candidate: Candidate) -> bool:
-    """Whether the effect acts before the dynamics, which can imitate it, so that the cost has several minima."""
-    effect = candidate.effect
-    return effect.place is ChainPosition.DRIVE or effect.host is not None
 
 
 def refits_of_relatives(candidates: Sequence[Candidate], best: FittedCandidate, before: Score) -> list[FittedCandidate]:

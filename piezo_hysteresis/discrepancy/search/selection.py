@@ -155,7 +155,10 @@ def _best_effect(
     """Refits of the best candidates, the best of them, and why its effect is rejected or None."""
     best: FittedCandidate | None = None
     reason: str | None = None
-    refits = best_of_each(refit_candidates(model, _worth_a_refit(screened, before), before, progress))
+    first = screened[:REFITS]
+    if before.excess <= ADEQUATE:  # what remains is small
+        first = [c for c in first if before.cost - c.score.cost >= LEAST_GAIN]
+    refits = best_of_each(refit_candidates(model, first, before, progress))
     if refits:
         relatives = refits_of_relatives(screened, refits[0], before)
         refits = best_of_each([*refits, *relatives, *refits_of_creep(model, screened, refits[0])])
@@ -168,12 +171,6 @@ def _best_effect(
         refits = best_of_each([*refits, *late])
         best, reason = _judged(refits, before)
     return refits, best, reason
-
-
-def _worth_a_refit(screened: Sequence[Candidate], before: Score) -> Sequence[Candidate]:
-    """The best candidates; at the floor, what remains is small, and only those whose predicted gain is sufficient."""
-    best = screened[:REFITS]
-    return best if before.excess > ADEQUATE else [c for c in best if before.cost - c.score.cost >= LEAST_GAIN]
 
 
 def _untried_twin(effect: type[Effect], effects: Collection[type[Effect]]) -> str | None:
