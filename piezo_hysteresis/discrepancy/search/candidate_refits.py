@@ -24,11 +24,12 @@ from ...effects import AmplifierSaturation, Creep, ThermalDrift
 from ...effects.effect import ChainPosition
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Progress
+from ...identification.fit.form_uncertainty import LAG
 from ...identification.records.noise_floor import ADEQUATE
 from ...identification.structure.prior import CREEP
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate
-from .refit import FIRST, LAG, LATER, collected, from_all_starts, proceed, refit, refit_anew, restart
+from .refit import FIRST, LATER, collected, from_all_starts, proceed, refit, refit_anew, restart
 
 LEAST_GAIN = 0.15
 """Smallest gain in mean ln max(1, R²) for which an effect is accepted."""

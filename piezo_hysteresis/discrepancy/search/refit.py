@@ -30,6 +30,7 @@ from ...errors import DivergenceError, IdentificationError, ModelError, Paramete
 from ...identification.cores import on_cores
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit, fit
+from ...identification.fit.form_uncertainty import LAG
 from ...identification.fit.normal_equations import Linearised, residuals
 from ...identification.fit.time_limit import check_time
 from ...identification.records.noise_floor import ADEQUATE
@@ -43,8 +44,6 @@ from .training_data import TrainingData
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-LAG = "lag"
-"""Family of the effects that delay the motion."""
 LINEAR = (LAG, "dynamics")
 """Families of effects that dynamics of sufficient order can contain."""
 TOLERANCE = 1e-3

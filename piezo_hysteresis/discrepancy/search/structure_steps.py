@@ -32,7 +32,7 @@ from ...identification.steps.remaining_lag import AMPLIFIERS
 from ...identification.structure.piece_fit import DELAY
 from ...identification.structure.pieces import pieces_of
 from ...identification.structure.pole_place import with_pole_behind
-from ...identification.structure.structure_choice import LEADS
+from ...identification.structure.structure_choice import CREEPS, LEADS
 from ...identification.structure.structure_fit import fit_structure
 from ...identification.structure.uncertainty import as_fit
 from ...model.model import Model
@@ -54,8 +54,6 @@ ORDER = (
     *POLES,
 )
 """Optional effects of a structure, the largest first."""
-SLOW = (Creep.name, CreepTwoRates.name)
-"""Effects that drift can imitate."""
 FEW = 8
 """Number of linearisations of an intermediate model, which starts near its optimum."""
 
@@ -84,8 +82,8 @@ def structure_steps(
         return FittedCandidate(fit.model[name], training_data, score_model(fit.model, training_data), fit)
 
     def rivals(name: str) -> tuple[FittedCandidate, ...]:
-        """A drift instead of creep, if cross-validation is about as good."""
-        if name not in SLOW or ThermalDrift.name in found.model:
+        """A drift instead of creep, which it can imitate, if cross-validation is about as good."""
+        if name not in CREEPS or ThermalDrift.name in found.model:
             return ()
         start = ThermalDrift.starts(training_data.extent)[0]
         drift = refitted(found.model.without(name).with_effect(start))
