@@ -141,8 +141,8 @@ def _score(
 def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Effect]]) -> list[Candidate]:
     """Score test of every effect of the catalogue at each of its start values, best first.
 
-    Effects that are off at their start share one pass over the data. An effect with a finite start is represented by
-    the change that it makes.
+    Effects that are off at their start share one pass over the data, but for hum, which is free in every record. An
+    effect with a finite start is represented by the change that it makes.
     """
     base = adjusted_numbers(model, training_data)
     starts = [
@@ -170,11 +170,8 @@ def starts_of(effect: type[Effect], extent: Extent) -> tuple[Effect, ...]:
 
 def _screen_group(model: Model, training_data: TrainingData, base: list[str], group: list[Effect]) -> list[Candidate]:
     """Score test of effects that share one pass over the data."""
-    if not group[0].is_off:
-        return _screen_moves(model, training_data, base, group)
-    if isinstance(group[0], MainsHum):
-        return [Candidate(group[0], training_data, score_model(model.with_effect(group[0]), training_data))]
-    return _screen_off(model, training_data, base, group)
+    screened = _screen_off if group[0].is_off else _screen_moves
+    return screened(model, training_data, base, group)
 
 
 def _fits(model: Model, training_data: TrainingData, effect: type[Effect]) -> bool:
