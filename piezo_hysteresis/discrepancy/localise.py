@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,29 +97,26 @@ def localise(
     total = sum(float(p.sum()) for p in power)
     if total == 0.0:
         return ()
-    end = max(r.start_time + r.duration for r in records)
-    times = [f"{k * end / 10:.3g} to {(k + 1) * end / 10:.3g} s" for k in range(10)]
-    phases = list(dict.fromkeys(r.phase for r in records))
     spectra = [_one_sided(e) / (f * f) for e, f in zip(residuals, floors, strict=True)]
-    frequencies = [np.fft.rfftfreq(r.size, r.sample_period) for r in records]
-    places = [
-        _place(
-            "phase", phases, [np.array([phases.index(r.phase)]) for r in records], [p.sum(keepdims=True) for p in power]
-        ),
-        _place("frequency", _ranges(FREQUENCIES, "g", "Hz"), [_bins(FREQUENCIES, f) for f in frequencies], spectra),
-    ]
+    lines = [np.searchsorted(FREQUENCIES, np.fft.rfftfreq(r.size, r.sample_period), side="right") - 1 for r in records]
+    phases = list(dict.fromkeys(r.phase for r in records))
+    end = max(r.start_time + r.duration for r in records)
     lowest = min(float(r.voltage.min()) for r in records)
     span = max(float(r.voltage.max()) for r in records) - lowest
-    drive = [_drive_bins(r, lowest, span) for r in records]
+    samples = [_sample_bins(r, lowest, span, end) for r in records]
     labels = {
         "amplitude": TENTHS,
         "direction": ["falling drive", "drive at rest", "rising drive"],
         "turning_point_distance": [f"{tenth} after a turning point" for tenth in TENTHS],
         "time_since_level_change": [f"{time} after a change of level" for time in _ranges(REST_TIMES, ".2g", "s")],
+        "absolute_time": [f"{k * end / 10:.3g} to {(k + 1) * end / 10:.3g} s" for k in range(10)],
     }
-    places += [_place(axis, names, [bins[axis] for bins in drive], power) for axis, names in labels.items()]
-    tenth = [np.minimum((10 * r.time / end).astype(int), 9) for r in records]
-    places.append(_place("absolute_time", times, tenth, power))
+    axes = {
+        "phase": (phases, [np.array([phases.index(r.phase)]) for r in records], [p.sum(keepdims=True) for p in power]),
+        "frequency": (_ranges(FREQUENCIES, "g", "Hz"), lines, spectra),
+        **{axis: (names, [bins[axis] for bins in samples], power) for axis, names in labels.items()},
+    }
+    places = [_place(axis, *along) for axis, along in axes.items()]
     return tuple(place for place, _ in sorted(places, key=lambda found: -found[1]))
 
 
@@ -155,11 +151,8 @@ def _ranges(edges: Array, form: str, unit: str) -> list[str]:
     return [f"{a:{form}} {unit} or more" if np.isinf(b) else f"{a:{form}} to {b:{form}} {unit}" for a, b in pairs]
 
 
-def _bins(edges: Array, values: NDArray[np.floating[Any]]) -> Bins:
-    return np.searchsorted(edges, values, side="right") - 1
-
-
-def _drive_bins(record: Record, lowest: float, span: float) -> dict[str, Bins]:
+def _sample_bins(record: Record, lowest: float, span: float, end: float) -> dict[str, Bins]:
+    """The bin of every sample along the axes of drive and time; −1 for a sample in none of them."""
     u = record.voltage
     scale = max(span, 1e-300)
     steps = np.diff(u, prepend=record.settled_voltage)
@@ -171,10 +164,11 @@ def _drive_bins(record: Record, lowest: float, span: float) -> dict[str, Bins]:
     turned = np.diff(going, prepend=going[0]) != 0
     turn = np.maximum.accumulate(np.where(turned, np.arange(u.size), 0))
     rests = ~moving & (last_move >= 0)
-    times = _bins(REST_TIMES, (np.arange(u.size) - last_move) * record.sample_period)
+    times = np.searchsorted(REST_TIMES, (np.arange(u.size) - last_move) * record.sample_period, side="right") - 1
     return {
         "amplitude": np.clip((10 * (u - lowest) / scale).astype(int), 0, 9),
         "direction": (sign + 1).astype(int),
         "turning_point_distance": np.clip((10 * np.abs(u - u[turn]) / scale).astype(int), 0, 9),
         "time_since_level_change": np.where(rests, np.minimum(times, REST_TIMES.size - 2), -1),
+        "absolute_time": np.minimum((10 * record.time / end).astype(int), 9),
     }
