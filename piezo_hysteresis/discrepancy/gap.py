@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +26,7 @@ import scipy
 
 from ..blocks.block import Array
 from ..effects import MainsHum
+from ..errors import DivergenceError
 from ..identification.fit.normal_equations import Nuisance
 from ..identification.free_run_error import free_per_record, residuals_on
 from ..identification.records.excitation_check import moves
@@ -104,12 +106,16 @@ class Gap:
         """The same share of what the model leaves if it is fitted to these records without the effects."""
         return (self.refitted or self).explained
 
-    def stated_by(self, model: Model, experiment: Experiment, everywhere: Gap | None = None) -> Model:
+    def stated_by(self, model: Model, experiment: Experiment, setup: BaselineSetup | None = None) -> Model:
         """The extended model with the experiment as its origin, and with its errors.
 
-        `everywhere` is the gap on all records that are compared with the model; by default, this is it.
+        The errors are those on all records of `setup` that are compared with a model; without it, or if the model
+        diverges on one of them, those of the gap.
         """
-        rows = (everywhere or self).per_phase
+        rows = self.per_phase
+        if setup is not None and len(rows) < len(setup.usable):
+            with suppress(DivergenceError):
+                rows = gap_between(model, model, setup, setup.usable, offset=self.free_zeros).per_phase
         after, moving = [p.after for p in rows], [p.after for p in rows if moves(experiment[p.index])]
         percent = max(after), float(np.sqrt(np.mean(np.square(moving or after))))
         largest, mean = (0.01 * experiment.range * max(error, self.live) for error in percent)

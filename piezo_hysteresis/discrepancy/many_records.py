@@ -181,16 +181,12 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
         reason += f" {CHOSEN.format(f'{100 * gap.explained:.0f} %').capitalize()}."
     found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
     noted = state.experiment.noting(*missing_excitation(state.experiment.records, setup.usable, found))
-    everywhere, correction = None, None
-    if delivered is not given and len(tested) < len(setup.usable):
-        with suppress(DivergenceError):
-            everywhere = gap_between(delivered, delivered, setup, setup.usable, offset=given is not None)
-    if is_unexplained and structured is None:
-        correction = best_correction(final.model, setup, state.experiment)
+    is_open = is_unexplained and structured is None
+    correction = best_correction(final.model, setup, state.experiment) if is_open else None
     return Diagnosis(
         conclusion,
         reason,
-        model=given if delivered is given else gap.stated_by(delivered, noted, everywhere),
+        model=given if delivered is given else gap.stated_by(delivered, noted, setup),
         baseline=first.stated_model if given is None else given,
         experiment=noted,
         selection=selection,

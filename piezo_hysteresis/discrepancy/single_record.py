@@ -96,13 +96,10 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     said = conclusion_of_few(selection, is_certain, setup.score, gap, len(setup.usable), several, missing, origin)
     if said[0] is Conclusion.MISSING_EFFECT and given is None and ExtraResonance.name in shown:
         said = said[0], said[1] + ("" if roles_of(experiment).broadband else ONLY_A_LAG)
-    everywhere = None
-    if setup.test_records and final is not given:
-        everywhere = gap_between(final, final, setup, setup.usable, offset=True)
     noted = experiment.noting(*missing)
     return Diagnosis(
         *said,
-        model=given if final is given else gap.stated_by(final, noted, everywhere),
+        model=given if final is given else gap.stated_by(final, noted, setup),
         baseline=first,
         experiment=noted,
         selection=selection,

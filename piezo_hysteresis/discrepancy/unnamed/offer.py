@@ -145,7 +145,7 @@ def judged_on_test_records(
         most = f"at most {100 * (WORSE - 1.0):.0f} % is allowed"
         refusal = f"it increases the error of a test record by {100 * (found.worst - 1.0):.0f} %, and {most}"
         return replace(found, refusal=refusal)
-    stated = gap.stated_by(fit.stated_model, experiment, everywhere)
+    stated = replace(gap, per_phase=everywhere.per_phase).stated_by(fit.stated_model, experiment)
     envelope = identified_range(setup.records, setup.fitted)
     return replace(found, model=replace(stated, provenance={**stated.provenance, **envelope}))
 
