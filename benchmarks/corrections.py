@@ -178,7 +178,7 @@ def answer(case: Case) -> tuple[Outcome, Drawing | None]:
         records, sigma = second.records, noise_floors(second.records)
         least, chosen = floors(records, sigma), range(len(records))
         models = (found.model, correction.model)
-        gap = measure_gap(models, records, chosen, least.tolist(), stroke(records), unseen=True)
+        gap = measure_gap(models, records, chosen, least, stroke(records), unseen=True)
         sizes = np.array([(p.before, p.after, p.floor) for p in gap.per_phase])
         ratios = sizes[:, 1] / sizes[:, 0]
         null = float(np.mean((sigma / least) ** 2))

@@ -150,7 +150,7 @@ def measure_gap(
     models: tuple[Model, Model],
     records: Sequence[Record],
     chosen: Sequence[int],
-    floors: Sequence[float],
+    floors: Sequence[float] | Array,
     stroke: float,
     *,
     unseen: bool,
@@ -214,5 +214,4 @@ def gap_between(
 ) -> Gap:
     """`measure_gap` on the records `chosen` of a search; only its test records are unseen."""
     unseen = set(chosen) <= set(setup.test_records)
-    least = setup.least.tolist()
-    return measure_gap((before, after), setup.records, chosen, least, setup.span, unseen=unseen, offset=offset)
+    return measure_gap((before, after), setup.records, chosen, setup.least, setup.span, unseen=unseen, offset=offset)

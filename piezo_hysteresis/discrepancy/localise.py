@@ -61,7 +61,7 @@ class ResidualShare:
 
 
 def located(
-    model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float], offset: bool = False
+    model: Model, records: Sequence[Record], used: Sequence[int], floors: Sequence[float] | Array, offset: bool = False
 ) -> tuple[ResidualShare, ...]:
     """Shares of the residual of a model on the records `used`, along every axis.
 

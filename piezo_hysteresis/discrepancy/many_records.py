@@ -119,11 +119,10 @@ def _search(state: DiagnosisState, setup: BaselineSetup) -> Selection:
 
 def _where(state: DiagnosisState, setup: BaselineSetup, model: Model) -> tuple[ResidualShare, ...]:
     state.progress("location of the residual", 0.82)
-    least = setup.least.tolist()
     try:
-        return located(model, setup.records, setup.usable, least)
+        return located(model, setup.records, setup.usable, setup.least)
     except DivergenceError:  # on a test record, which moves further than those that were fitted
-        return located(model, setup.records, setup.fitted, least)
+        return located(model, setup.records, setup.fitted, setup.least)
 
 
 def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection) -> Diagnosis:

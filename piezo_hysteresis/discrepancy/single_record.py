@@ -81,7 +81,7 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     setup, model, found = _start(state)
     several = has_several_drives(setup.records, setup.fitted)
     state.progress("location of the residual", 0.5)
-    where = located(setup.baseline.model, setup.records, setup.fitted, setup.least.tolist(), offset=True)
+    where = located(setup.baseline.model, setup.records, setup.fitted, setup.least, offset=True)
     selection, fit, is_certain = _extended(state, setup, model, found, several)
     state.progress("gap", 0.9)
     first, final = given or setup.baseline.model, selection.model  # the gap of a given model is that before any refit
@@ -186,7 +186,7 @@ def _best(
     A model that diverges on a test record is not taken.
     """
     best = None
-    judged = setup.records, setup.least.tolist(), setup.fitted
+    judged = setup.records, setup.least, setup.fitted
     reached = score_left_out(model, *judged, adjusts=found is not None) if contenders else 0.0
     for contender in contenders:
         extended = contender.stated_model

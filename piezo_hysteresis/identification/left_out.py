@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
+from ..blocks.block import Array
 from ..model.model import Model
 from ..record import Record
 from .structure.piece_fit import PieceFit, linearised
@@ -33,7 +34,12 @@ SEEN = 0.05
 
 
 def score_left_out(
-    model: Model, records: Sequence[Record], floors: Sequence[float], fitted: Collection[int], *, adjusts: bool = True
+    model: Model,
+    records: Sequence[Record],
+    floors: Sequence[float] | Array,
+    fitted: Collection[int],
+    *,
+    adjusts: bool = True,
 ) -> float:
     """Mean ln max(1, R²) over rates, amplitudes and records, each left out in turn.
 

@@ -82,7 +82,7 @@ def joint(
         model,
         training_data.records,
         adjusted_numbers(model, training_data),
-        floors=training_data.floors.tolist(),
+        floors=training_data.floors,
         nuisance=training_data.free_with(model),
         max_iterations=max_iterations,
         tolerance=tolerance,

@@ -124,7 +124,7 @@ def fit(
     records: Sequence[Record],
     free: Sequence[str],
     *,
-    floors: Sequence[float] | None = None,
+    floors: Sequence[float] | Array | None = None,
     nuisance: Nuisance | None = None,
     max_iterations: int = 40,
     tolerance: float = 1e-6,

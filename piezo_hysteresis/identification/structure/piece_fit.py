@@ -137,7 +137,7 @@ class PieceFit:
 def linearised(
     model: Model,
     pieces: Sequence[RecordPiece],
-    floors: Sequence[float],
+    floors: Sequence[float] | Array,
     names: Sequence[str],
     slow: Sequence[Array] | None = None,
 ) -> tuple[Array, Array]:
