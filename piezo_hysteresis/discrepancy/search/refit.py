@@ -226,13 +226,16 @@ def without(candidate: FittedCandidate) -> Fitted | None:
 
 
 def _absorbed(model: Model, extended: Model, training_data: TrainingData) -> Model | None:
-    """The model with dynamics that imitate `extended`, which has one more linear effect; None if there are none."""
+    """The model with dynamics that imitate `extended`, which has one more linear effect; None if there are none.
+
+    Without the effect, the model may diverge.
+    """
     broadband = training_data.broadband
     if not broadband:
         return None
     records = training_data.records
-    missed = [a - b for a, b in zip(extended.free_run(records), model.free_run(records), strict=True)]
-    signals = dynamics_signals(model, records, broadband, missed)
-    with suppress(IdentificationError, ParameterError, DivergenceError):
+    with suppress(*FAILURES):
+        missed = [a - b for a, b in zip(extended.free_run(records), model.free_run(records), strict=True)]
+        signals = dynamics_signals(model, records, broadband, missed)
         return with_dynamics(model, identify_arx(signals, *form_of(model), ITERATIONS).arx)
     return None

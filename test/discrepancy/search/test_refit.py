@@ -17,13 +17,23 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import scipy
 
 from piezo_hysteresis.discrepancy.search.candidates import Candidate, score_model
-from piezo_hysteresis.discrepancy.search.refit import proceed, refit, restart
+from piezo_hysteresis.discrepancy.search.refit import proceed, refit, restart, without
 from piezo_hysteresis.discrepancy.search.training_data import TrainingData
-from piezo_hysteresis.effects import HYSTERESIS, AmplifierSlewLimit, Arx, MainsHum, Offset
+from piezo_hysteresis.effects import (
+    HYSTERESIS,
+    AmplifierBandwidth,
+    AmplifierSlewLimit,
+    Arx,
+    MainsHum,
+    Offset,
+    Softening,
+)
 from piezo_hysteresis.effects.extent import Extent
+from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.records.noise_floor import ADEQUATE
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
@@ -74,3 +84,21 @@ def test_dynamics_are_estimated_anew_without_the_hum_of_the_recordings():
     assert begun is not None
     assert begun.score.excess > 10.0
     assert restart(begun, 1).score.excess < 1.1
+
+
+def test_a_model_that_diverges_without_a_lag_is_not_compared_with():
+    """Such a model, whose mode softens, ended the diagnosis with a DivergenceError."""
+    rng, pole = np.random.default_rng(0), AmplifierBandwidth(tau=5e-3)
+    fast = STAGE.with_effect(Arx(a=(-1.58, 0.79), b=(0.21,))).with_effect(Softening(k3=-0.2))
+    slow = fast.with_effect(pole)
+    drives = [np.repeat(rng.uniform(0.0, 10.0, 120), 50) for _ in range(2)]
+    records = [Record(u, u, PERIOD, initial_voltage=0.0) for u in drives]
+    records = [replace(r, displacement=y) for r, y in zip(records, slow.simulate(records), strict=True)]
+    with pytest.raises(DivergenceError):
+        fast.free_run(records)
+    data = TrainingData(tuple(records), np.full(2, NOISE), Extent.of(records, 10.0, 1e-5))
+    assert data.broadband
+    found = refit(fast, Candidate(pole, data, score_model(slow, data)), 1)
+    assert found is not None
+    with np.errstate(over="ignore", invalid="ignore"):  # as in `diagnose`
+        assert without(found) is None
