@@ -42,9 +42,8 @@ from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, ref
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate, screen
 from piezo_hysteresis.discrepancy.search.refit import without
 from piezo_hysteresis.discrepancy.search.selection import REFITS
-from piezo_hysteresis.discrepancy.search.selection_result import explained, typical
+from piezo_hysteresis.discrepancy.search.selection_result import NAMED, explained, typical
 from piezo_hysteresis.discrepancy.search.training_data import choose_test_records
-from piezo_hysteresis.discrepancy.verdict import NAMED
 from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
 from piezo_hysteresis.identification.protocol import protocol

@@ -27,8 +27,7 @@ from ..identification.fit.form_uncertainty import ADEQUACY
 from ..identification.records.noise_floor import ADEQUATE
 from ..record import Notice
 from .gap import Gap
-from .search.acceptance_tests import FAR
-from .search.selection_result import Selection
+from .search.selection_result import Selection, share_for_a_name
 
 FEWEST_RECORDS = 4
 """Fewest records from which test records can be taken and an effect can be named."""
@@ -36,8 +35,6 @@ TEST_ADEQUATE, TEST_INADEQUATE = 1.1, 1.5
 """Error on the test records in units of the floor. Up to the first value nothing is missing, even if V (mean squared
 error in floors²) of the training records is a little high. Above the second value something is missing, even if V of
 the training records is low."""
-NAMED, NAMED_FAR = 0.6, 0.75
-"""Smallest explained fraction of the gap for a name, and the same if the remaining error is large."""
 
 CHOSEN = (
     "the saved model has the structure that predicts best in cross-validation; it explains {} of the gap of the "
@@ -96,8 +93,7 @@ class Conclusion(StrEnum):
 
 def is_explained(selection: Selection) -> bool:
     """Whether the added effects explain enough of the gap for a name."""
-    share = NAMED if selection.score.excess <= FAR else NAMED_FAR
-    return bool(selection.accepted) and selection.explained(selection.score) >= share
+    return bool(selection.accepted) and selection.explained(selection.score) >= share_for_a_name(selection.score.excess)
 
 
 def named_conclusion(selection: Selection, gap: Gap) -> tuple[Conclusion, str]:
@@ -178,14 +174,14 @@ def conclusion_of_few(
     amplitude can be explained by wrong effects. `origin` says which model is saved, if it contains no further effect.
     """
     enough, is_adequate = count >= FEWEST_RECORDS, before.excess <= ADEQUATE
-    explains = gap.falls and gap.explained >= NAMED
+    explains = gap.falls and gap.explained >= share_for_a_name(selection.score.excess)
     if explains and decided:
         return Conclusion.MISSING_EFFECT, _reason_of_structure(selection, gap)
     if explains and enough and several and is_explained(selection):
         return named_conclusion(selection, gap)
     if not selection.in_time:
         return unnamed_conclusion(selection, gap.falls, gap)
-    if enough and not decided and (several or is_adequate):
+    if enough and (several or is_adequate):
         judged = replace(gap, after=gap.before) if is_adequate else gap  # of the published model
         conclusion, reason = unnamed_conclusion(selection, gap.falls, judged)
         if is_adequate or conclusion is not Conclusion.NOTHING_MISSING:

@@ -79,6 +79,7 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
         yield _with_dynamics(start, records, (broadband, moving), delay, iterations)
     if moving != broadband:
         yield _with_dynamics(start, records, (moving, broadband), delay, ITERATIONS)
+    yield _with_dynamics(frame, records, (broadband, moving), delay, ITERATIONS)
 
 
 def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int]) -> Iterator[Model]:

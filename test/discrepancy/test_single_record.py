@@ -211,6 +211,17 @@ def test_a_structure_that_fits_does_not_show_that_nothing_is_missing():
     assert conclusion is Conclusion.INSUFFICIENT_DATA and "explains" in reason
 
 
+@pytest.mark.parametrize(("after", "left", "named"), [(0.6, 4.0, True), (0.6, 20.0, False), (0.4, 20.0, True)])
+def test_a_structure_that_leaves_a_large_gap_must_explain_more(after, left, named):
+    """Of a Preisach stage, an even polynomial was named beside the plays, and 4.5 floors remained."""
+    before, score = Score(np.full(4, 20.0), np.zeros(1)), Score(np.full(4, np.sqrt(left)), np.zeros(1))
+    model = Model((BoucWen(),), SLOW_PERIOD, 10.0, 1e-5)
+    gap = Gap(2.0, after, 0.1, None, (PhaseGap("sine", 0, 2.0, after, 0.1),), False, after)
+    conclusion, reason = conclusion_of_few(Selection(model, model, score, (), 1.0), True, before, gap, 4, True, ())
+    assert (conclusion is Conclusion.MISSING_EFFECT) is named
+    assert named or "no effect of the catalogue explains" in reason
+
+
 def test_the_reason_states_the_share_of_the_measured_gap_and_the_model_that_is_saved():
     """Of a gap from 0.267 to 0.151 % with a floor of 0.03 % it was said that 0 % is explained."""
     score, model = Score(np.full(1, 5.0), np.zeros(1)), Model((BoucWen(),), SLOW_PERIOD, 10.0, 1e-5)

@@ -89,6 +89,15 @@ def test_many_steps_show_the_same_step_response_only(voltage, noise, random):
     assert not content(voltage, 1e-3).is_broadband
 
 
+def test_where_no_drive_is_slow_the_slower_ones_show_the_loop(random):
+    """Loops at 400 Hz, steps and noise show the dynamics as much; the operator ended as a relay."""
+    time = 1e-4 * np.arange(10_000)
+    drives = [5.0 - 4.0 * np.cos(2.0 * np.pi * f * time) for f in (50.0, 100.0, 400.0)]
+    drives += [random.uniform(0.0, 10.0, time.size), np.repeat([0.0, 9.0, 2.0, 7.0], time.size // 4)]
+    experiment = Experiment(tuple(Record(u, 1e-6 * u, 1e-4, initial_voltage=0.0) for u in drives))
+    assert roles_of(experiment).loops == (0, 1)
+
+
 def test_ramps_between_levels_are_changes_of_one_way():
     ramped = np.interp(np.arange(20_500), (500 * np.arange(41)[:, None] + [20, 500]).ravel(), np.repeat(LEVELS, 2))
     assert content(ramped, 1e-3).levels

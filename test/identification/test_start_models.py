@@ -60,6 +60,24 @@ def test_a_sensor_of_reversed_sign_has_a_negative_gain():
         assert start.hysteresis["p2"] > 0.0
 
 
+def test_a_stage_that_only_fast_drives_show_is_described_from_one_of_the_starts():
+    """No record shows a static loop, and every fit ended as a relay, with V at 150 or more."""
+    pole = np.exp(2.0 * np.pi * 900.0 * PERIOD * (-0.05 + 1j))
+    a = np.real(np.poly([pole, pole.conj()]))
+    loop = BoucWen(A=-0.45, beta=7.0, gamma=-1.5, p1=-0.1, p2=1.8)
+    stage = Model((loop, Arx(a=tuple(a[1:]), b=(a.sum(),), delay=2.0)), PERIOD, 10.0, 1e-5)
+    rng, records = np.random.default_rng(3), []
+    for top in (1200.0, 800.0, 1200.0, 800.0):
+        lines = rng.normal(size=2501) + 1j * rng.normal(size=2501)
+        lines[np.arange(2501) > top / (1.0 / (5000 * PERIOD))] = 0.0
+        wave = np.fft.irfft(lines)
+        drive = 5.0 + 4.5 * wave / np.abs(wave).max()
+        y = stage.simulate(Record(drive, drive, PERIOD, initial_voltage=0.0))[0]
+        records.append(Record(drive, y + 1e-8 * rng.normal(size=y.size), PERIOD, "noise", initial_voltage=0.0))
+    setup = baseline_setup.prepare_baseline(records, range(4), None, None, False, lambda word, part: None)
+    assert setup.score.excess < 1.5
+
+
 def test_a_start_from_which_the_fit_fails_hides_no_later_one(monkeypatch):
     first, second, third = (
         exact(Model((BoucWen(), Arx(a=(), b=(1.0,), delay=d)), PERIOD, 10.0, 1e-5)) for d in (1, 2, 3)

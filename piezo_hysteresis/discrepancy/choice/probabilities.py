@@ -29,9 +29,8 @@ from ...identification.fit.cross_validation import Score
 from ...identification.fit.form_uncertainty import PIECES
 from ...identification.records.noise_floor import ADEQUATE
 from ..diagnosis import Diagnosis
-from ..search.acceptance_tests import FAR
-from ..search.selection_result import Step
-from ..verdict import NAMED, NAMED_FAR, Verdict
+from ..search.selection_result import Step, share_for_a_name
+from ..verdict import Verdict
 from .time_to_decide import ONE_RECORD
 
 NOTHING, NONE_OF_THESE = "nothing", "none of these"
@@ -153,7 +152,7 @@ def tolerant(score: Score) -> Score:
 
 def part_explained(before: Score, null: float) -> Score:
     """Score of a wrong explanation that by chance removes, in every record, the share of the gap needed for a name."""
-    share = NAMED if before.excess <= FAR else NAMED_FAR
+    share = share_for_a_name(before.excess)
     gap = np.maximum(before.ratios**2 - null, 0.0)
     return Score(np.sqrt(null + (1.0 - share) ** 2 * gap), before.step)
 

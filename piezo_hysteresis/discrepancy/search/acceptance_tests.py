@@ -36,8 +36,6 @@ STEADY = 0.3
 """Smallest share of the gain of hum that hum of the lower quartile of its power explains."""
 UNCERTAIN = 0.05
 """Probability of a size at least as large without the effect, up to which the effect is certain."""
-FAR = 10.0
-"""V above which the remaining error is large: a similar effect of another family may explain as much of the gap."""
 PEAKS = 3.0
 """Standard deviations that noise hardly exceeds."""
 

@@ -23,12 +23,15 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from ...effects import Effect
-from .acceptance_tests import FAR, is_certain
+from ...identification.records.noise_floor import ADEQUATE
+from .acceptance_tests import is_certain
 from .candidate_refits import LEAST_GAIN, best_of_each, leaves_room, settled, simplest
 from .candidates import FittedCandidate, screen
 from .refit import LATER, Fitted, collected, converged, refit, without
-from .selection_result import Step
+from .selection_result import FAR, NAMED, Step, explained
 
 
 def certain(steps: Sequence[Step]) -> list[Step]:
@@ -39,7 +42,7 @@ def certain(steps: Sequence[Step]) -> list[Step]:
     """
     kept, is_precise = list(steps), False
     while accepted := [step for step in kept if step.accepted]:
-        found = _possibly_absent(accepted) or _outweighed(accepted)
+        found = _possibly_absent(accepted, is_precise) or _unconvincing(accepted)
         if found is None:
             break
         if not is_precise:
@@ -58,28 +61,42 @@ def certain(steps: Sequence[Step]) -> list[Step]:
     return kept
 
 
-def _possibly_absent(accepted: Sequence[Step]) -> tuple[Step, str] | None:
-    """The newest step whose effect may be absent by its interval, and this reason; None if there is none."""
+def _possibly_absent(accepted: Sequence[Step], is_precise: bool) -> tuple[Step, str] | None:
+    """The newest step whose effect may be absent by its interval, and this reason; None if there is none.
+
+    An interval holds near the optimum. Of a precise fit, it does not count against an effect without which the error is
+    large.
+    """
     for step in reversed(accepted):
-        if not is_certain(_beside_newest(step, accepted)):
+        beside = _beside_newest(step, accepted)
+        if is_certain(beside):
+            continue
+        left, share = _without(beside) if is_precise else (0.0, 0.0)
+        if left <= FAR or share < NAMED:
             return step, "its interval does not exclude that it is absent"
     return None
 
 
-def _outweighed(accepted: Sequence[Step]) -> tuple[Step, str] | None:
-    """The step whose effect explains least, if it explains less than a large error that remains, and this reason.
+def _unconvincing(accepted: Sequence[Step]) -> tuple[Step, str] | None:
+    """The step whose effect explains least beside the others, if this is not enough for a name, and this reason.
 
-    Such an error is one of form, and the effect may only imitate a part of it.
+    What remains is then an error of form, of which the effect may only imitate a part.
     """
-    remains = accepted[-1].best.score.excess
-    if remains <= FAR or len(accepted) == 1:
+    newest = accepted[-1].best
+    if newest.score.excess <= ADEQUATE:
         return None
-    alone = [(step, without(_beside_newest(step, accepted))) for step in accepted]
-    left = {step: fitted.score.excess for step, fitted in alone if fitted is not None}
-    least = min(left, key=lambda step: left[step], default=None)
-    if least is None or left[least] > 2.0 * remains:
+    shares = [(_without(_beside_newest(step, accepted))[1], step) for step in accepted]
+    least, step = min(shares, key=lambda found: found[0])
+    if least >= NAMED:
         return None
-    return least, "beside the others, it explains less of the error than what remains of it"
+    return step, f"it explains only {100 * least:.0f} % of the gap of the model that was refitted without it"
+
+
+def _without(candidate: FittedCandidate) -> tuple[float, float]:
+    """V of the model refitted without an effect, infinite if it diverges, and the explained share of its gap."""
+    alone = without(candidate)
+    left = np.inf if alone is None else alone.score.excess
+    return left, explained(left, candidate.score.excess, candidate.training_data.null)
 
 
 def needed(accepted: Sequence[Step]) -> list[Step]:

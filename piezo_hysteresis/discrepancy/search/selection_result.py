@@ -27,6 +27,10 @@ from .candidate_refits import LEAST_GAIN
 from .candidates import Candidate, FittedCandidate
 from .training_data import TrainingData
 
+FAR = 10.0
+"""V above which the remaining error is large: a similar effect of another family may explain as much of the gap."""
+NAMED, NAMED_FAR = 0.6, 0.75
+"""Smallest explained fraction of the gap for a name, and the same if the remaining error is large."""
 MANY = 8
 """Number of records from which the worst one is ignored in the explained share."""
 
@@ -118,6 +122,11 @@ class Selection:
         """Share X of the gap of the baseline that is explained at a score, 0 to 1; the worst record is ignored."""
         first = self.steps[0].before if self.steps else self.score
         return explained(*typical(first, score), self.null)
+
+
+def share_for_a_name(excess: float) -> float:
+    """Smallest explained fraction of the gap for a name, if the error V remains."""
+    return NAMED if excess <= FAR else NAMED_FAR
 
 
 def typical(before: Score, after: Score) -> tuple[float, float]:

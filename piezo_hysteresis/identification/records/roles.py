@@ -29,6 +29,9 @@ HELD_OUT = ("validation",)
 LARGE = 0.5
 """Drive range of a slow record, as a share of the largest one, from which the record counts as loops."""
 
+ALSO_SLOW = 4.0
+"""Largest ratio of the bandwidth of a drive to that of the slowest, if both count as loops because none is slow."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Roles:
@@ -44,6 +47,7 @@ class Roles:
         Records that are not fitted; the model is tested on them.
     loops : tuple of int
         Slow records with large loops. On them the dynamics are only a gain and a lag, so they show the hysteresis.
+        If none is slow, the slower ones without noise and steps, which show the dynamics as much as the loop.
     broadband : tuple of int
         Records at the fastest sample period whose drive determines linear dynamics.
     """
@@ -78,6 +82,9 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
     largest = max((contents[i].span for i in fitted), default=0.0)
     moving = [i for i in fitted if contents[i].span >= LARGE * largest > 0.0]
     slow = [i for i in moving if contents[i].is_slow]
+    smooth = [i for i in moving if not (contents[i].is_broadband or contents[i].is_step)]
+    slowest = min((contents[i].bandwidth for i in smooth), default=0.0)
+    slower = [i for i in smooth if contents[i].bandwidth <= ALSO_SLOW * slowest]
     straight = [i for i in fitted if experiment[i].phase.split("_")[0] == "triangle"]
     triangles = [i for i in slow if i in straight]
     fastest = experiment.fastest_period
@@ -87,7 +94,7 @@ def roles_of(experiment: Experiment, held_out: Collection[str] = HELD_OUT) -> Ro
     least = MOVES * largest * (voltage_noise(experiment.records) > 0.0)
     rich = [i for i in rich if contents[i].span >= least[i]]
     broadband = [i for i in rich if experiment[i].sample_period < 1.001 * fastest]
-    return Roles(contents, tuple(fitted), out, tuple(triangles or slow or moving), tuple(broadband))
+    return Roles(contents, tuple(fitted), out, tuple(triangles or slow or slower or moving), tuple(broadband))
 
 
 def _held_out(experiment: Experiment, phases: Collection[str]) -> tuple[int, ...]:
