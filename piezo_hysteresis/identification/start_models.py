@@ -53,8 +53,9 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
     """Starts for a joint fit: hysteresis from slow loops, delay from steps, dynamics from broadband records.
 
     Only the records with the indices `fitted` are used. A missing effect can disturb the iterations of the dynamics, so
-    a model after few iterations follows the one after many. Noise may hide modes that larger motion shows, so the last
-    model uses all records that move.
+    a model after few iterations follows the one after many. Noise may hide modes that larger motion shows, so the next
+    model uses all records that move. The last one has the loop of the paper: without slow records, the loop that was
+    fitted can end as a relay, and no joint fit leads back.
     """
     experiment = Experiment(tuple(records))
     roles = roles_of(experiment)

@@ -24,6 +24,7 @@ from examples.demo.truth import in_numbers_of
 from examples.hide_effect import HIGHEST_VOLTAGE, individual_stage
 from piezo_hysteresis.discrepancy import Verdict, diagnose, gap
 from piezo_hysteresis.discrepancy.gap import measure_gap
+from piezo_hysteresis.effects import MainsHum
 from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.protocol import protocol
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
@@ -77,7 +78,7 @@ def test_a_model_that_diverges_on_a_test_record_is_not_named(monkeypatch):
         return measure_gap(models, *others, **options)
 
     monkeypatch.setattr(gap, "measure_gap", measured)
-    found = diagnose(HUM.experiment())
+    found = diagnose(HUM.experiment(), effects=[MainsHum])
     assert found.verdict is Verdict.UNKNOWN
     assert found.names == ()
     assert "mains_hum" not in found.model

@@ -102,7 +102,7 @@ def test_data_of_an_explicit_step_have_an_answer_on_request_only():
 
 def test_an_effect_outside_the_catalogue_is_unknown():
     case = hidden(group="uncatalogued", extra={"unknown": UNKNOWN["line"], "unknown_name": ("line",)})
-    found = diagnose(case.experiment(), effects=[BY_NAME[n] for n in FEW])
+    found = diagnose(case.experiment(), effects=[BY_NAME[n] for n in ("creep", "thermal_drift", "softening")])
     assert found.verdict is Verdict.UNKNOWN
     assert found.effects() == []
     assert "no effect of the catalogue explains" in found.reason
@@ -255,7 +255,7 @@ def test_a_model_that_diverges_on_a_test_record_ends_with_an_answer(identified_f
 
 
 def test_no_effect_is_named_if_its_twin_was_not_a_candidate():
-    found = diagnose(hidden("softening").experiment(), effects=[BY_NAME[n] for n in FEW])
+    found = diagnose(hidden("softening").experiment(), effects=[BY_NAME[n] for n in ("softening", "extra_delay")])
     assert found.conclusion is Conclusion.UNEXPLAINED_GAP
     assert "the closest effect is softening" in found.reason and "sensor_nonlinearity" in found.reason
 

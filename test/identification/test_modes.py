@@ -16,7 +16,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
@@ -76,6 +76,7 @@ def test_four_modes_are_more_accurate_than_with_least_squares_of_the_arx(modes):
     assert error(at_full_rate) > 3 * error(identify_modes([(drive, y)], 1, PERIOD, (8, 8), ITERATIONS))
 
 
+@settings(max_examples=30)
 @given(frequency=st.floats(80.0, 3000.0), damping=st.floats(0.01, 0.3), seed=st.integers(0, 99))
 def test_one_mode_is_known_to_a_hundredth(frequency, damping, seed):
     found = identify_modes([recorded([(frequency, damping, 1.0)], seed)], 1, PERIOD, (4, 4), ITERATIONS)
