@@ -80,14 +80,15 @@ def _possibly_absent(accepted: Sequence[Step], is_precise: bool) -> tuple[Step, 
 def _unconvincing(accepted: Sequence[Step]) -> tuple[Step, str] | None:
     """The step whose effect explains least beside the others, if this is not enough for a name, and this reason.
 
-    What remains is then an error of form, of which the effect may only imitate a part.
+    What remains is then an error of form, of which the effect may only imitate a part. The smaller it is beside the
+    floor, the less is asked of an effect.
     """
-    newest = accepted[-1].best
-    if newest.score.excess <= ADEQUATE:
+    remains = accepted[-1].best.score.excess
+    if remains <= ADEQUATE:
         return None
     shares = [(_without(_beside_newest(step, accepted))[1], step) for step in accepted]
     least, step = min(shares, key=lambda found: found[0])
-    if least >= NAMED:
+    if least >= min(NAMED, 1.0 - 1.0 / np.sqrt(remains)):
         return None
     return step, f"it explains only {100 * least:.0f} % of the gap of the model that was refitted without it"
 
