@@ -129,10 +129,10 @@ class ChangeDetector:
         statistic = np.where(seen, gradients**2 / np.where(seen, weights * variance, 1.0), 0.0)
         at, largest = np.unravel_index(int(statistic.argmax()), statistic.shape)
         candidates, metric = seen[at] & (np.arange(len(GROUPS)) != _OFFSET), _left_by_offset(sums[1][at])
-        if largest == _OFFSET:  # a change of another group, beside the same offset, moves it, too
+        if largest == _OFFSET or not candidates.any():  # a change of another group moves the offset, too
             gradients, weights, candidates = sums[0], np.diagonal(sums[1], axis1=1, axis2=2), seen[at]
             variance, metric = self._variance(scatter, weights, sums[1]), sums[1][at]
-        gains = gradients[at] ** 2 / np.where(candidates, weights[at], np.inf)
+        gains = np.where(candidates, gradients[at] ** 2 / np.where(candidates, weights[at], 1.0), -1.0)
         alike = _alike(int(gains.argmax()), metric)
         left = np.diag(metric)[alike] / np.diag(sums[1][at])[alike]
         alike = [k for k, share in zip(alike, left, strict=True) if share > CANCELLED * left.max()]

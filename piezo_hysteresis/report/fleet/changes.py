@@ -98,4 +98,4 @@ def _scatter(halves: Sequence[Array]) -> tuple[float, float]:
 
 def _normal(distance: float, freedom: float) -> float:
     """The number of standard deviations of a normal variable that is as rare as a value of Student's t."""
-    return float(norm.isf(t.sf(distance, freedom)))
+    return min(distance, float(norm.isf(t.sf(distance, freedom))))  # the probability may be too small for a number
