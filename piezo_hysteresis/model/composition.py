@@ -73,8 +73,10 @@ class Composition:
         Raises
         ------
         ModelError
-            If the chain has none.
+            If the chain has none, or `kind` is no class.
         """
+        if not isinstance(kind, type):
+            raise ModelError(f"effect: got {kind!r}, expected a class such as Arx; model[name] finds an effect by name")
         for effect in self.effects:
             if isinstance(effect, kind):
                 return effect

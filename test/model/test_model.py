@@ -118,6 +118,7 @@ def test_a_run_continues_at_another_sample_period_with_its_state() -> None:
         (lambda: Model((Arx(),), PERIOD, displacement_scale=float("nan")), "displacement_scale: got nan"),
         (lambda: MODEL["creep"], "no effect 'creep' in the chain bouc_wen, arx"),
         (lambda: MODEL.effect(Creep), "no effect 'creep'"),
+        (lambda: MODEL.effect("arx"), "got 'arx', expected a class"),
         (lambda: MODEL.at(PERIOD / 2), "expected 0.001 s .* or more; decimate"),
         (lambda: MODEL.run([], MODEL.rest(0.0)), "voltage: got shape"),
         (lambda: MODEL.run([[1.0]], MODEL.rest(0.0)), "voltage: got shape"),
