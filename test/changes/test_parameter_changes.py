@@ -83,7 +83,7 @@ def test_a_delay_is_found_with_its_size(model, another_day, samples):
     [
         ({"filter_pole": 2e-3}, "low_pass", 2e-3),
         ({"filter_drive": 2e-3}, "low_pass_before", 2e-3),
-        ({"filter_twice": 2e-3}, "low_pass_2", 2e-3),
+        pytest.param({"filter_twice": 2e-3}, "low_pass_2", 2e-3, marks=pytest.mark.soak),
         ({"softening": 0.03}, "softening", 0.03),
         ({"gain": 1.06}, "gain", 0.06),
     ],
@@ -165,7 +165,10 @@ def ringing():
     return stage.on_another_day(rng), identify(triangles(stage, True), memory=True).model
 
 
-@pytest.mark.parametrize(("changed", "lag"), [({"filter_pole": 1e-3}, 1e-3), ({"filter_twice": 2.5e-4}, 3.536e-4)])
+@pytest.mark.parametrize(
+    ("changed", "lag"),
+    [({"filter_pole": 1e-3}, 1e-3), pytest.param({"filter_twice": 2.5e-4}, 3.536e-4, marks=pytest.mark.soak)],
+)
 def test_ringing_between_samples_does_not_bias_a_lag(ringing, changed, lag):
     """Triangles let a stage ring; linear between samples, the lags were 0.97 and 0.37 ms, outside their intervals."""
     later, before = ringing

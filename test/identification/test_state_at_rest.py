@@ -62,7 +62,7 @@ def percent(model, records):
         pytest.param("generalised plays", LOOP, 0.2, marks=pytest.mark.soak),
         pytest.param("relays", 0.6 * LOOP, 0.4, marks=pytest.mark.soak),
         ("generalised plays", STILL, 0.3),
-        ("Coleman-Hodgdon", LOOP, 0.4),
+        pytest.param("Coleman-Hodgdon", LOOP, 0.4, marks=pytest.mark.soak),
     ],
 )
 def test_other_drives_are_predicted_whatever_was_driven_before(kind, before, largest):

@@ -89,10 +89,10 @@ def change_and_records(model, **changed):
         {"design": "bessel", "corner": 100.0},
         pytest.param({"design": "bessel", "corner": 200.0}, marks=pytest.mark.soak),
         pytest.param({"design": "bessel", "order": 8, "corner": 100.0}, marks=pytest.mark.soak),
-        {"design": "butter", "order": 3, "corner": 100.0},
+        pytest.param({"design": "butter", "order": 3, "corner": 100.0}, marks=pytest.mark.soak),
         pytest.param({"design": "butter", "corner": 50.0}, marks=pytest.mark.soak),
         pytest.param({"design": "butter", "corner": 200.0}, marks=pytest.mark.soak),
-        {"filter_pole": 3e-3, "filter_delay": 1e-3},
+        pytest.param({"filter_pole": 3e-3, "filter_delay": 1e-3}, marks=pytest.mark.soak),
     ],
     ids=str,
 )
@@ -122,7 +122,7 @@ def test_two_slow_poles_are_found_whatever_the_lag_of_the_best_butterworth_filte
     [
         ("filter_pole", 0.15, "low_pass"),
         ("filter_drive", 0.2, "low_pass_before"),
-        ("filter_delay", 0.3, "delay"),
+        pytest.param("filter_delay", 0.3, "delay", marks=pytest.mark.soak),
     ],
 )
 def test_a_lag_of_hundreds_of_samples_is_named(model, name, late, key):
