@@ -49,20 +49,20 @@ def certain(steps: Sequence[Step]) -> list[Step]:
             precise = replace(accepted[-1], best=converged(accepted[-1].best))
             kept, is_precise = [*accepted[:-1], precise, *kept[len(accepted) :]], True
             continue
-        step, reason = found
+        step, reason, alone = found
         if step is accepted[-1]:
             rejected = {step.best.name: reason, **step.rejected}
             kept = [*accepted[:-1], replace(step, accepted=False, rivals=(), rejected=rejected)]
             continue
-        fewer = _taken_back(step, accepted, without(_beside_newest(step, accepted)), reason)
+        fewer = _taken_back(step, accepted, alone, reason)
         if fewer is None:
             break
         kept = [*fewer, *kept[len(accepted) :]]
     return kept
 
 
-def _possibly_absent(accepted: Sequence[Step], is_precise: bool) -> tuple[Step, str] | None:
-    """The newest step whose effect may be absent by its interval, and this reason; None if there is none.
+def _possibly_absent(accepted: Sequence[Step], is_precise: bool) -> tuple[Step, str, Fitted | None] | None:
+    """The newest step whose effect may be absent by its interval, this reason, and the model without it; or None.
 
     An interval holds near the optimum. Of a precise fit, it does not count against an effect without which the error is
     large.
@@ -71,14 +71,17 @@ def _possibly_absent(accepted: Sequence[Step], is_precise: bool) -> tuple[Step, 
         beside = _beside_newest(step, accepted)
         if is_certain(beside):
             continue
-        left, share = _without(beside) if is_precise else (0.0, 0.0)
-        if left <= FAR or share < NAMED:
-            return step, "its interval does not exclude that it is absent"
+        alone = without(beside) if is_precise else None
+        left = np.inf if alone is None else alone.score.excess
+        if not is_precise or left <= FAR or _share(beside, alone) < NAMED:
+            return step, "its interval does not exclude that it is absent", alone
     return None
 
 
-def _unconvincing(accepted: Sequence[Step]) -> tuple[Step, str] | None:
-    """The step whose effect explains least beside the others, if this is not enough for a name, and this reason.
+def _unconvincing(accepted: Sequence[Step]) -> tuple[Step, str, Fitted | None] | None:
+    """The step whose effect explains least beside the others, if this is too little for a name; else None.
+
+    With the step, this reason and the model without the effect.
 
     What remains is then an error of form, of which the effect may only imitate a part. The smaller it is beside the
     floor, the less is asked of an effect.
@@ -86,18 +89,20 @@ def _unconvincing(accepted: Sequence[Step]) -> tuple[Step, str] | None:
     remains = accepted[-1].best.score.excess
     if remains <= ADEQUATE:
         return None
-    shares = [(_without(_beside_newest(step, accepted))[1], step) for step in accepted]
-    least, step = min(shares, key=lambda found: found[0])
-    if least >= min(NAMED, 1.0 - 1.0 / np.sqrt(remains)):
+    beside = [_beside_newest(step, accepted) for step in accepted]
+    alone = [without(candidate) for candidate in beside]
+    shares = [_share(*pair) for pair in zip(beside, alone, strict=True)]
+    least = int(np.argmin(shares))
+    if shares[least] >= min(NAMED, 1.0 - 1.0 / np.sqrt(remains)):
         return None
-    return step, f"it explains only {100 * least:.0f} % of the gap of the model that was refitted without it"
+    reason = f"it explains only {100 * shares[least]:.0f} % of the gap of the model that was refitted without it"
+    return accepted[least], reason, alone[least]
 
 
-def _without(candidate: FittedCandidate) -> tuple[float, float]:
-    """V of the model refitted without an effect, infinite if it diverges, and the explained share of its gap."""
-    alone = without(candidate)
-    left = np.inf if alone is None else alone.score.excess
-    return left, explained(left, candidate.score.excess, candidate.training_data.null)
+def _share(candidate: FittedCandidate, alone: Fitted | None) -> float:
+    """Share of the gap of the model without an effect that the effect explains; 1 if this model diverges."""
+    null = candidate.training_data.null
+    return 1.0 if alone is None else explained(alone.score.excess, candidate.score.excess, null)
 
 
 def needed(accepted: Sequence[Step]) -> list[Step]:

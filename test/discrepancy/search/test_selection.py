@@ -137,7 +137,7 @@ def test_an_effect_that_explains_less_than_a_large_error_that_remains_is_not_nam
     """Beside a slew limit and a saturation in another order, an even polynomial was named and left V at 239 of 222."""
     drift, hidden = ThermalDrift(D=3e-7, tau=10.0), Backlash(b=0.03)
     steps = steps_with((CREEP, DRIFT) if first else (DRIFT, CREEP), (drift, hidden))
-    assert steps[-1].best.score.excess > ADEQUATE
+    assert steps[-1].best.score.excess > FAR
     kept = certain(steps)
     assert [step.best.name for step in kept if step.accepted] == [DRIFT.name]
     assert [name for step in kept for name in step.rejected] == [CREEP.name]
