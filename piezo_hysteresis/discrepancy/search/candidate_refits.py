@@ -54,7 +54,12 @@ def refit_candidates(
     """Joint refits, best first: few linearisations for all, then new dynamics, then convergence for the best ones."""
     progress("refits of the candidates", 0.2)
     first = partial(refit, model, max_iterations=FIRST)
-    refits = collected(first, candidates, lambda c, found: not any(_is_far_behind(c, r, before) for r in found))
+
+    def is_wanted(candidate: Candidate, found: Sequence[FittedCandidate]) -> bool:
+        """Beside a refit at the floor, only a rival of it is."""
+        return all(_is_close(candidate, other, before) for other in found if other.score.excess <= ADEQUATE)
+
+    refits = collected(first, candidates, is_wanted)
     refits.sort(key=BY_COST)
     progress("new estimate of the dynamics", 0.6)
 
@@ -114,11 +119,6 @@ def refits_of_relatives(candidates: Sequence[Candidate], best: FittedCandidate, 
 def _anew(candidate: FittedCandidate) -> FittedCandidate:
     """The refit with newly estimated dynamics, if a further gain is possible."""
     return candidate if candidate.score.cost <= LEAST_GAIN else restart(candidate, FIRST)
-
-
-def _is_far_behind(candidate: Candidate, best: FittedCandidate, before: Score) -> bool:
-    """Whether the best candidate is at the floor and the other one is no rival."""
-    return best.score.excess <= ADEQUATE and not _is_close(candidate, best, before)
 
 
 def _is_close(candidate: Candidate, best: FittedCandidate, before: Score) -> bool:
