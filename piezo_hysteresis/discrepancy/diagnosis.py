@@ -115,10 +115,8 @@ class Diagnosis(Pictured):
         if self.gap is not None and self.model is not None and name in self.model:
             return f"it is in the model but not named: the model explains {100 * self.gap.explained:.0f} % of the gap"
         closed = f"{100 * selection.explained(selection.score):.0f} % of the gap"
-        closest = [s.best.name for s in selection.accepted]
-        if len(closest) > 1:
-            return f"the closest effects, {' and '.join(closest)}, explain only {closed} together"
-        return f"it is the closest effect, but explains only {closed}"
+        closest = " with ".join(s.best.effect.public_name() for s in selection.accepted)
+        return f"the closest effect is {closest}, which explains only {closed}"
 
     def effects(self) -> list[dict[str, Any]]:
         """The named effects, as in ``answer.json``."""
