@@ -31,8 +31,6 @@ FAR = 10.0
 """V above which the remaining error is large: a similar effect of another family may explain as much of the gap."""
 NAMED, NAMED_FAR = 0.6, 0.75
 """Smallest explained fraction of the gap for a name, and the same if the remaining error is large."""
-MANY = 8
-"""Number of records from which the worst one is ignored in the explained share."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -119,23 +117,14 @@ class Selection:
         return last.best
 
     def explained(self, score: Score) -> float:
-        """Share X of the gap of the baseline that is explained at a score, 0 to 1; the worst record is ignored."""
+        """Share X of the gap of the baseline that is explained at a score, 0 to 1."""
         first = self.steps[0].before if self.steps else self.score
-        return explained(*typical(first, score), self.null)
+        return explained(first.excess, score.excess, self.null)
 
 
 def share_for_a_name(excess: float) -> float:
     """Smallest explained fraction of the gap for a name, if the error V remains."""
     return NAMED if excess <= FAR else NAMED_FAR
-
-
-def typical(before: Score, after: Score) -> tuple[float, float]:
-    """V of two models; with many records, without the one that the second model describes worst."""
-    kept = np.arange(after.ratios.size)
-    if kept.size >= MANY and before.ratios.size == kept.size:
-        kept = np.delete(kept, int(np.argmax(after.ratios)))
-    first, second = (float(np.mean(s.ratios[kept] ** 2)) for s in (before, after))
-    return first, second
 
 
 def explained(before: float, after: float, null: float) -> float:
