@@ -31,10 +31,8 @@ from .search.selection_result import Selection, share_for_a_name
 
 FEWEST_RECORDS = 4
 """Fewest records from which test records can be taken and an effect can be named."""
-TEST_ADEQUATE, TEST_INADEQUATE = 1.1, 1.5
-"""Error on the test records in units of the floor. Up to the first value nothing is missing, even if V (mean squared
-error in floors²) of the training records is a little high. Above the second value something is missing, even if V of
-the training records is low."""
+TEST_INADEQUATE = 1.5
+"""Error on the test records, in floors, above which something is missing, even if V of the training records is low."""
 
 CHOSEN = (
     "the saved model has the structure that predicts best in cross-validation; it explains {} of the gap of the "
@@ -133,9 +131,7 @@ def unnamed_conclusion(selection: Selection, falls: bool, gap: Gap) -> tuple[Con
     if not selection.in_time:
         return Conclusion.TIME_LIMIT, "No effect is named: the time limit ended the search before an answer was found."
     start = selection.steps[0].before if selection.steps else selection.score
-    many = gap.unseen and len(gap.per_phase) >= FEWEST_RECORDS and not selection.accepted
-    is_adequate = many and gap.after <= TEST_ADEQUATE * gap.floor and start.excess <= 2.0 * ADEQUATE
-    if is_adequate or start.excess <= ADEQUATE:
+    if start.excess <= ADEQUATE:
         if gap.after > TEST_INADEQUATE * gap.floor:
             times = f"the error on the test records is {gap.after / gap.floor:.1f} times the noise floor"
             said = f"No effect is named: the training records show no missing effect, but {times}."
