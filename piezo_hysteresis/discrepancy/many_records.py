@@ -119,10 +119,7 @@ def _search(state: DiagnosisState, setup: BaselineSetup) -> Selection:
 
 def _where(state: DiagnosisState, setup: BaselineSetup, model: Model) -> tuple[ResidualShare, ...]:
     state.progress("location of the residual", 0.82)
-    try:
-        return located(model, setup.records, setup.usable, setup.least)
-    except DivergenceError:  # on a test record, which moves further than those that were fitted
-        return located(model, setup.records, setup.fitted, setup.least)
+    return located(model, setup.records, setup.fitted, setup.least)
 
 
 def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection) -> Diagnosis:
