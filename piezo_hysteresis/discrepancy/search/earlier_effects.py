@@ -28,7 +28,7 @@ import numpy as np
 from ...effects import Effect
 from ...identification.records.noise_floor import ADEQUATE
 from .acceptance_tests import is_certain
-from .candidate_refits import LEAST_GAIN, best_of_each, leaves_room, settled, simplest
+from .candidate_refits import best_of_each, leaves_room, settled, simplest
 from .candidates import FittedCandidate, screen
 from .refit import LATER, Fitted, collected, converged, refit, without
 from .selection_result import FAR, NAMED, Step, explained
@@ -103,22 +103,6 @@ def _share(candidate: FittedCandidate, alone: Fitted | None) -> float:
     """Share of the gap of the model without an effect that the effect explains; 1 if this model diverges."""
     null = candidate.training_data.null
     return 1.0 if alone is None else explained(alone.score.excess, candidate.score.excess, null)
-
-
-def needed(accepted: Sequence[Step]) -> list[Step]:
-    """The steps without those whose effects the newest one makes superfluous."""
-    steps = list(accepted)
-    for name in [step.best.name for step in accepted[:-1]]:
-        (step,) = (s for s in steps if s.best.name == name)
-        newest, earlier = steps[-1].best, _beside_newest(step, steps)
-        if is_certain(earlier):
-            continue
-        alone = without(earlier)
-        if alone is None or alone.score.cost - newest.score.cost >= LEAST_GAIN:
-            continue
-        reason = f"beside {newest.name}, its interval does not exclude that it is absent"
-        steps = _taken_back(step, steps, alone, reason) or steps
-    return steps
 
 
 def in_best_laws(accepted: Sequence[Step], effects: Collection[type[Effect]]) -> list[Step]:

@@ -43,7 +43,7 @@ from .candidate_refits import (
     simplest,
 )
 from .candidates import Candidate, FittedCandidate, screen
-from .earlier_effects import certain, in_best_laws, needed
+from .earlier_effects import certain, in_best_laws
 from .refit import Fitted, converged, without
 from .selection_result import Selection, Step
 from .training_data import TrainingData
@@ -90,7 +90,7 @@ def select(
             steps.append(step)
             if not step.accepted:
                 break
-            steps = in_best_laws(needed(steps), effects)
+            steps = in_best_laws(steps, effects)
             best = steps[-1].best
             now, reached, data = best.fit.model, best.score, best.training_data
         steps = certain(steps)
