@@ -72,12 +72,11 @@ def step_changes(model: Model, records: Sequence[Record]) -> list[Array]:
     return [found[i][1] - found[i][0] if i in wanted else np.zeros(r.size) for i, r in enumerate(records)]
 
 
-def explicit_model(model: Model, training_data: TrainingData, leaves: float = np.inf) -> Model | None:
+def explicit_model(model: Model, training_data: TrainingData) -> Model | None:
     """The model of data that were simulated with the explicit step; None if the residual does not contain its error.
 
     The error computed with a model that was fitted to such data is not exact. The error is subtracted and the model
-    fitted again, until both agree. The cost may not exceed `leaves` after this: a large missing effect can have a
-    similar residual.
+    fitted again, until both agree.
     """
     if BoucWen.name not in model:
         return None
@@ -97,7 +96,7 @@ def explicit_model(model: Model, training_data: TrainingData, leaves: float = np
             changes = step_changes(model, records)
             if _largest([a - b for a, b in zip(changes, before, strict=True)], floors) < SEEN:
                 break
-        if found.cost < leaves and abs(_share(model, freed, changes)) < LEFT:
+        if abs(_share(model, freed, changes)) < LEFT:
             return model
     return None
 

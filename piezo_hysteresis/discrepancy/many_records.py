@@ -45,8 +45,6 @@ from .search.training_data import TrainingData
 from .unnamed.offer import REMOVES, best_correction
 from .verdict import CHOSEN, Conclusion, Verdict, is_explained, named_conclusion, unnamed_conclusion
 
-STEPS_LEAVE = 10.0
-"""Largest cost after the subtraction of an explicit step, if it is subtracted before the search."""
 EXPLICIT = (
     "No verdict is possible: the data were simulated with the explicit step of Eq. (7), which no real stage takes. "
     "Diagnose them with --explicit-step (Python: explicit_step=True)."
@@ -71,25 +69,19 @@ def diagnose_many(state: DiagnosisState) -> Diagnosis:
     that was found corrects averaged samples differently.
     """
     setup = _baseline(state)
-    explicit = None
-    if setup.score.excess > ADEQUATE:
-        explicit = explicit_model(setup.baseline.model, setup.training_data, STEPS_LEAVE)
     selection = _search(state, setup)
-    freed = None if explicit is None else _freed(state, explicit)
-    if freed is not None:
+    models = [setup.baseline.model] if setup.score.excess > ADEQUATE else []
+    models += [s.best.fit.model for s in selection.accepted if s.best.score.excess > ADEQUATE]
+    for explicit in filter(None, (explicit_model(model, setup.training_data) for model in models)):
+        freed = _freed(state, explicit)
         if selection.score.excess < BETTER * freed[2].score.excess:
-            explicit = None
-    elif selection.in_time:
-        bests = (s.best for s in selection.accepted if s.best.score.excess > ADEQUATE)
-        reached = selection.accepted[-1].best.fit.cost if selection.accepted else np.inf
-        models = (explicit_model(best.fit.model, best.training_data, reached) for best in bests)
-        explicit = next((model for model in models if model is not None), None)
-    if explicit is not None:
+            continue
         if not state.explicit_step:
             model = selection.baseline
             where = _where(state, setup, model)
             return Diagnosis(Conclusion.INSUFFICIENT_DATA, EXPLICIT, model, model, state.experiment, where=where)
-        state, setup, selection = freed or _freed(state, explicit)
+        state, setup, selection = freed
+        break
     extends = selection.in_time and selection.accepted and state.corrects_intersample_error
     if extends and setup.changes_intersample_error(selection.model):
         sharper = _baseline(state, selection)

@@ -26,7 +26,7 @@ from piezo_hysteresis.discrepancy.search import earlier_effects
 from piezo_hysteresis.discrepancy.search.acceptance_tests import is_certain
 from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, leaves_room, refits_of_relatives
 from piezo_hysteresis.discrepancy.search.candidates import Candidate, score_model
-from piezo_hysteresis.discrepancy.search.earlier_effects import certain, in_best_laws, needed
+from piezo_hysteresis.discrepancy.search.earlier_effects import certain, in_best_laws
 from piezo_hysteresis.discrepancy.search.refit import LATER, refit
 from piezo_hysteresis.discrepancy.search.selection import select
 from piezo_hysteresis.discrepancy.search.selection_result import FAR, Selection, Step, explained
@@ -109,7 +109,7 @@ def steps_with(order, hidden):
 def test_an_effect_that_a_later_one_makes_superfluous_is_taken_back(hidden):
     """Of a stage with creep, drift was named first and stayed beside it, with an interval from −17 to 19 times."""
     steps = steps_with((DRIFT, CREEP), hidden)
-    kept = needed(steps)
+    kept = certain(steps)
     assert [step.best.name for step in kept] == [e.name for e in hidden]
     assert kept[-1].best.score.excess < ADEQUATE
     assert kept[0].before is steps[0].before
@@ -119,17 +119,9 @@ def test_an_effect_that_a_later_one_makes_superfluous_is_taken_back(hidden):
 
 def test_two_effects_that_a_later_one_makes_superfluous_are_taken_back():
     """The step after the first one had become another one, and `piezo diagnose` ended with a ValueError."""
-    (kept,) = needed(steps_with((DRIFT, EvenInputPolynomial(), CREEP), (CREEP,)))
+    (kept,) = certain(steps_with((DRIFT, EvenInputPolynomial(), CREEP), (CREEP,)))
     assert kept.best.name == CREEP.name and kept.best.score.excess < ADEQUATE
     assert set(kept.rejected) == {DRIFT.name, EvenInputPolynomial.name}
-
-
-def test_no_effect_is_named_beside_later_ones_if_its_interval_does_not_exclude_that_it_is_absent():
-    """Beside a rate law and hum, a pole of 55 µs (−59 to 168 µs) was named, because only hum was asked."""
-    (kept,) = certain(steps_with((DRIFT, CREEP), (CREEP,)))
-    assert kept.accepted and kept.best.name == CREEP.name
-    assert DRIFT.name not in kept.best.fit.model
-    assert list(kept.rejected) == [DRIFT.name]
 
 
 @pytest.mark.parametrize("first", [True, False])
