@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy.special import chdtri
 
@@ -26,9 +28,6 @@ from ...identification.records.noise_floor import ADEQUATE, stroke
 from .candidate_refits import LEAST_GAIN
 from .candidates import FittedCandidate
 from .refit import without
-
-SHOWN = 0.005
-"""Smallest gain that a number with two decimals shows."""
 
 PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
 """Smallest number of mains periods in a record, longest sample period in mains periods, smallest number of records."""
@@ -44,8 +43,7 @@ def first_rejection(best: FittedCandidate, before: Score) -> str | None:
     """First reason to reject a fitted candidate; None if it passes all tests. The cheap tests come first."""
     gain = before.cost - best.score.cost
     if gain < LEAST_GAIN:
-        lowers = f"lowers mean ln R² by {_below(gain)}" if gain >= SHOWN else "does not lower mean ln R²"
-        return f"in cross-validation it {lowers}, and a decrease by {LEAST_GAIN:g} is needed"
+        return f"in cross-validation it lowers mean ln R² by {_below(gain)}, and a decrease by {LEAST_GAIN:g} is needed"
     if best.name == MainsHum.name and not is_steady(best, before):
         return "its amplitude depends on the drive, which mains hum does not"
     if not exceeds_voltage_noise(best):
@@ -53,16 +51,15 @@ def first_rejection(best: FittedCandidate, before: Score) -> str | None:
     alone = without(best)
     owed = LEAST_GAIN if alone is None else alone.score.cost - best.score.cost
     if owed < LEAST_GAIN:
-        gains = f"gains only {_below(owed)} of the {LEAST_GAIN:g} that are needed" if owed >= SHOWN else "gains nothing"
-        return f"it {gains} over the model that was refitted without it"
+        return f"it gains {_below(owed)} over the model that was refitted without it, and {LEAST_GAIN:g} is needed"
     if before.excess <= ADEQUATE and not is_certain(best):
         return "the error is at the floor, and its interval does not exclude that it is absent"
     return None
 
 
 def _below(gain: float) -> str:
-    """A gain below `LEAST_GAIN`, in two digits or in as many as show that it is below."""
-    return next(text for text in (f"{gain:.{digits}f}" for digits in range(2, 20)) if float(text) < LEAST_GAIN)
+    """A gain, rounded down to two decimals, so that a number below a limit looks below it; 0.00 for a loss."""
+    return f"{math.floor(100.0 * max(0.0, gain)) / 100.0:.2f}"
 
 
 def is_certain(candidate: FittedCandidate) -> bool:
