@@ -19,8 +19,6 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 
-import numpy as np
-
 from ..errors import DivergenceError, PiezoError
 from ..identification.fit.fit import Fit
 from ..identification.fit.form_uncertainty import with_alternative, with_form_uncertainty

@@ -44,6 +44,8 @@ REFITTED = "the saved model is the given one, fitted to these records; it explai
 KEPT = "the given model is saved unchanged, because a fit to these records predicts what was left out hardly better"
 """The same, if the given model is saved."""
 
+DECIDED = " An extended model predicts rates, amplitudes and records better that were left out of the fit."
+"""Added to the reason if the choice of the structure names the effects."""
 MORE_MAY_BE_MISSING = " The time limit ended the search; more effects may be missing."
 """Added to the reason if effects are named although the time limit ended the search."""
 
@@ -171,10 +173,9 @@ def conclusion_of_few(
     """
     enough, is_adequate = count >= FEWEST_RECORDS, before.excess <= ADEQUATE
     explains = gap.falls and gap.explained >= share_for_a_name(selection.score.excess)
-    if explains and decided:
-        return Conclusion.MISSING_EFFECT, _reason_of_structure(selection, gap)
-    if explains and enough and several and is_explained(selection):
-        return named_conclusion(selection, gap)
+    if explains and (decided or (enough and several and is_explained(selection))):
+        conclusion, reason = named_conclusion(selection, gap)
+        return conclusion, reason + (DECIDED if decided else "")
     if not selection.in_time:
         return unnamed_conclusion(selection, gap.falls, gap)
     if enough and (several or is_adequate):
@@ -199,16 +200,3 @@ def conclusion_of_few(
         (f"No effect is named, because {records} cannot distinguish effects", message, *(n.message for n in missing))
     )
     return Conclusion.INSUFFICIENT_DATA, f"{reason}."
-
-
-def _reason_of_structure(selection: Selection, gap: Gap) -> str:
-    """Why effects are named that the structure needs."""
-    names = [s.best.effect.public_name() for s in selection.accepted]
-    said = (
-        f"The model does not contain {' and '.join(names)}. An extended model predicts rates, amplitudes and "
-        f"records better that were left out of the fit; it explains {100 * gap.explained:.0f} % of the gap."
-    )
-    for name, step in zip(names, selection.accepted, strict=True):
-        if step.confusable_with:
-            said += f" These data cannot distinguish {name} from {' or '.join(step.confusable_with)}."
-    return said + ("" if selection.in_time else MORE_MAY_BE_MISSING)
