@@ -42,13 +42,13 @@ from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, ref
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate, screen
 from piezo_hysteresis.discrepancy.search.refit import without
 from piezo_hysteresis.discrepancy.search.selection import REFITS
-from piezo_hysteresis.discrepancy.search.selection_result import NAMED, explained, typical
-from piezo_hysteresis.discrepancy.search.training_data import choose_test_records
+from piezo_hysteresis.discrepancy.search.selection_result import NAMED, explained
 from piezo_hysteresis.effects import CATALOGUE
 from piezo_hysteresis.identification.fit.form_uncertainty import ADEQUACY
 from piezo_hysteresis.identification.protocol import protocol
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.identification.records.noise_floor import ADEQUATE, noise_floors, stroke
+from piezo_hysteresis.identification.training.training_data import choose_test_records
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.report.figures.style import MEASURED, PREDICTED, SETTINGS, canvas
 from piezo_hysteresis.report.palette import BLACK, BLUE, GREEN, GREY, ORANGE
@@ -215,7 +215,7 @@ def acceptance(diagnosis: Diagnosis) -> Figure:
     at = np.arange(len(fitted))
     gains.barh(at, [before.cost - c.score.cost for c in fitted], color=colours)
     gains.axvline(LEAST_GAIN, color=ORANGE, linestyle="--", label=f"limit: at least {LEAST_GAIN:g}")
-    left.barh(at, [100.0 * (1.0 - explained(*typical(before, c.score), null)) ** 2 for c in fitted], color=colours)
+    left.barh(at, [100.0 * (1.0 - explained(before.excess, c.score.excess, null)) ** 2 for c in fitted], color=colours)
     least = 100.0 * (1.0 - NAMED) ** 2
     left.axvline(least, color=ORANGE, linestyle="--", label=f"limit for a name: at most {least:.0f} %")
     alone = without(fitted[0])

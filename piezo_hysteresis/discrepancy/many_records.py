@@ -28,18 +28,19 @@ from ..identification.identify import identify
 from ..identification.records.excitation_check import missing_excitation
 from ..identification.records.noise_floor import ADEQUATE
 from ..identification.start_models import as_conditioning
+from ..identification.training.explicit_step import BETTER, explicit_model, without_steps
+from ..identification.training.joint_fit import LAST, PRECISE, TOLERANCE, joint
+from ..identification.training.training_data import TrainingData
 from ..model.model import Model
 from .choice.next_experiment import best_next_experiment
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
-from .explicit_step import BETTER, explicit_model, without_steps
 from .gap import Gap, gap_between
 from .localise import ResidualShare, located
 from .search.baseline_setup import BaselineSetup, prepare_baseline
-from .search.refit import LAST, PRECISE, TOLERANCE, joint, restart
+from .search.refit import restart
 from .search.selection import select
 from .search.selection_result import Selection
-from .search.training_data import TrainingData
 from .unnamed.offer import REMOVES, best_correction
 from .verdict import CHOSEN, Conclusion, Verdict, is_explained, named_conclusion, unnamed_conclusion
 

@@ -41,8 +41,12 @@ from ..identification.records.excitation_check import missing_excitation
 from ..identification.records.noise_floor import ADEQUATE, floors, noise_floors, noise_of_averages
 from ..identification.records.roles import roles_of
 from ..identification.records.sampling import shortened
-from ..identification.start_models import as_conditioning
+from ..identification.start_models import as_conditioning, with_zero
 from ..identification.structure.structure_choice import LEADS
+from ..identification.training.adjusted_numbers import loop_is_off
+from ..identification.training.joint_fit import LAST, joint
+from ..identification.training.model_score import score_model
+from ..identification.training.training_data import choose_test_records, training_data_of
 from ..model.model import Model
 from ..record import Record
 from .choice.next_experiment import best_next_experiment
@@ -50,13 +54,10 @@ from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .gap import gap_between
 from .localise import located
-from .search.baseline_setup import BaselineSetup, with_zero
-from .search.candidates import loop_is_off, score_model
-from .search.refit import LAST, joint
+from .search.baseline_setup import BaselineSetup
 from .search.selection import select
 from .search.selection_result import Selection, Step
 from .search.structure_steps import structure_steps
-from .search.training_data import choose_test_records, training_data_of
 from .verdict import CHOSEN, FEWEST_RECORDS, KEPT, REFITTED, Conclusion, conclusion_of_few
 
 SHARP = 1e-6

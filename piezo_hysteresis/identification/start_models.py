@@ -24,7 +24,7 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from ..effects import HYSTERESIS, Arx
+from ..effects import HYSTERESIS, Arx, Offset
 from ..errors import IdentificationError
 from ..model.model import Model
 from ..record import CONDITIONING, Experiment, Record
@@ -130,3 +130,19 @@ def _delay_without_steps(model: Model, records: Sequence[Record], broadband: Col
         with suppress(IdentificationError):  # unstable dynamics do not determine the delay
             errors[delay] = dynamics_behind(model, records, broadband, delay, ORDERS).free_run_error
     return min(errors, key=errors.__getitem__, default=found)
+
+
+def exact(model: Model) -> Model:
+    """The model with the exact loop, which accepts the terms of the catalogue, and with a sensor zero.
+
+    Raises
+    ------
+    ModelError
+        If a published loop has another exponent than n = 1, for which there is no exact step.
+    """
+    return with_zero(model.with_hysteresis(model.hysteresis.exact()) if model.has_hysteresis else model)
+
+
+def with_zero(model: Model) -> Model:
+    """The model with a sensor zero."""
+    return model if Offset.name in model else model.with_effect(Offset())

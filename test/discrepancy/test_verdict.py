@@ -26,12 +26,12 @@ from piezo_hysteresis.discrepancy.diagnosis import Diagnosis
 from piezo_hysteresis.discrepancy.gap import Gap, PhaseGap
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.discrepancy.verdict import Conclusion, is_explained, named_conclusion, unnamed_conclusion
 from piezo_hysteresis.effects import AmplifierSaturation, Arx, BoucWen, Creep, MainsHum
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
+from piezo_hysteresis.identification.training.training_data import TrainingData
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 from piezo_hysteresis.report.tables.answer_tables import effect_table

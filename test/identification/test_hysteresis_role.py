@@ -23,7 +23,6 @@ import pytest
 import piezo_hysteresis
 from piezo_hysteresis.blocks.block import Block
 from piezo_hysteresis.compensation import Inverse
-from piezo_hysteresis.discrepancy.search.baseline_setup import exact
 from piezo_hysteresis.effects import (
     CATALOGUE,
     CHAIN,
@@ -42,6 +41,7 @@ from piezo_hysteresis.errors import IdentificationError, ModelError
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.identification.protocol import excitation
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.identification.start_models import exact
 from piezo_hysteresis.inverse_terms import InverseStart, InverseTerms, PlayTerms
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.parameter import Parameter
@@ -64,7 +64,7 @@ ORDINARY = {"offset"}
 OTHER_MEANINGS = {("report/figures/creep.py", "creep")}  # the name of the figure
 ABOUT_ONE_OPERATOR = {
     "cli/model/identify.py",  # its option --published means the published operator
-    "discrepancy/explicit_step.py",  # recognises the step of Eq. (7)
+    "identification/training/explicit_step.py",  # recognises the step of Eq. (7)
 }
 LIMITS = DriveLimits(sample_period=2e-4)
 

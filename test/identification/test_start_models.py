@@ -18,9 +18,6 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy.search import baseline_setup
-from piezo_hysteresis.discrepancy.search.baseline_setup import exact
-from piezo_hysteresis.discrepancy.search.refit import Fitted
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, BoucWen
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.errors import DivergenceError
@@ -28,8 +25,10 @@ from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.identification.fit.normal_equations import Linearised
 from piezo_hysteresis.identification.records.noise_floor import noise_floors
-from piezo_hysteresis.identification.start_models import start_models
+from piezo_hysteresis.identification.start_models import exact, start_models
 from piezo_hysteresis.identification.steps.linear_start import dynamics_of
+from piezo_hysteresis.identification.training.model_score import Fitted
+from piezo_hysteresis.identification.training.training_data import TrainingData
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 

@@ -22,9 +22,9 @@ import numpy as np
 
 from ...identification.protocol.drive_limits import DriveLimits
 from ...identification.protocol.phases import ProtocolPhase
+from ...identification.training.training_data import TrainingData
 from ...record import CONDITIONING
 from ..search.selection_result import Selection
-from ..search.training_data import TrainingData
 from .tiers import spare_drives, tiers
 from .time_to_decide import ERROR_RATE, LONGEST, Separation, best_drive, missing_log_odds
 

@@ -31,11 +31,12 @@ from ...identification.fit.form_uncertainty import PIECES
 from ...identification.fit.normal_equations import grams
 from ...identification.protocol.phases import ProtocolPhase
 from ...identification.records.noise_floor import ADEQUATE
+from ...identification.training.adjusted_numbers import adjusted_numbers, directions
+from ...identification.training.joint_fit import FAILURES
+from ...identification.training.training_data import TrainingData
 from ...model.model import Model
 from ...record import Record
-from ..search.candidates import adjusted_numbers, directions, starts_of
-from ..search.refit import FAILURES
-from ..search.training_data import TrainingData
+from ..search.candidates import starts_of
 
 
 def still_hidden(

@@ -29,10 +29,11 @@ from ...identification.fit.bounded_step import gauge
 from ...identification.fit.form_uncertainty import PIECES
 from ...identification.fit.normal_equations import grams
 from ...identification.protocol.phases import ProtocolPhase
+from ...identification.training.adjusted_numbers import adjusted_numbers
+from ...identification.training.training_data import TrainingData
 from ...model.model import Model
 from ...record import Record
-from ..search.candidates import FittedCandidate, adjusted_numbers
-from ..search.training_data import TrainingData
+from ..search.candidates import FittedCandidate
 
 ERROR_RATE, LONGEST = 0.005, 600.0
 """Defaults of the accepted probability of a wrong answer, and of the longest stage time [s]."""

@@ -26,7 +26,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...blocks.block import Array
-from ...effects import Offset
 from ...effects.extent import Extent
 from ...errors import DivergenceError
 from ...identification.cores import start_helpers
@@ -37,14 +36,14 @@ from ...identification.records.conditioning import path_of, with_conditioning
 from ...identification.records.intersample_error import intersample_error
 from ...identification.records.noise_floor import noise_floors, noise_of_averages, stroke
 from ...identification.records.sampling import at_period, common_period, less, shortened, slowed
-from ...identification.start_models import modal_models, start_models
+from ...identification.start_models import exact, modal_models, start_models
+from ...identification.training.joint_fit import FAILURES, LAST, LATER, PRECISE, joint
+from ...identification.training.model_score import score_baseline, score_model, scored
+from ...identification.training.training_data import TrainingData, choose_test_records
 from ...model.model import Model
 from ...record import Record
 from .candidate_refits import leaves_room
-from .candidates import score_baseline, score_model
-from .refit import FAILURES, LAST, LATER, PRECISE, joint, scored
 from .selection_result import Selection
-from .training_data import TrainingData, choose_test_records
 
 SEARCHED, FITTED = 6_000, 50_000
 """Largest number of samples of a record, approximately, in the search and in the last fit."""
@@ -197,19 +196,3 @@ def better_fit(
                 if after.excess < share * score.excess:
                     return other, after
     return found, score
-
-
-def exact(model: Model) -> Model:
-    """The model with the exact loop, which accepts the terms of the catalogue, and with a sensor zero.
-
-    Raises
-    ------
-    ModelError
-        If a published loop has another exponent than n = 1, for which there is no exact step.
-    """
-    return with_zero(model.with_hysteresis(model.hysteresis.exact()) if model.has_hysteresis else model)
-
-
-def with_zero(model: Model) -> Model:
-    """The model with a sensor zero."""
-    return model if Offset.name in model else model.with_effect(Offset())

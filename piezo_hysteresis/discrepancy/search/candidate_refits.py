@@ -27,9 +27,10 @@ from ...identification.fit.fit import Progress
 from ...identification.fit.form_uncertainty import LAG
 from ...identification.records.noise_floor import ADEQUATE
 from ...identification.structure.prior import CREEP
+from ...identification.training.joint_fit import FIRST, LATER
 from ...model.model import Model
 from .candidates import BY_COST, Candidate, FittedCandidate
-from .refit import FIRST, LATER, collected, from_all_starts, proceed, refit, refit_anew, restart
+from .refit import collected, from_all_starts, proceed, refit, refit_anew, restart
 
 LEAST_GAIN = 0.15
 """Smallest gain in mean ln max(1, R²) for which an effect is accepted."""

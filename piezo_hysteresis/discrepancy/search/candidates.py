@@ -23,23 +23,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from operator import attrgetter
 
 import numpy as np
 
 from ...blocks.block import Array
-from ...effects import Arx, Effect, MainsHum, Offset
+from ...effects import Effect, MainsHum
 from ...effects.extent import Extent
 from ...errors import DivergenceError, ModelError, ParameterError
 from ...identification.cores import on_cores
-from ...identification.fit.bounded_step import gauge, room_of
-from ...identification.fit.cross_validation import Score, cross_validate, indispensable
+from ...identification.fit.cross_validation import Score
 from ...identification.fit.fit import Fit
-from ...identification.fit.normal_equations import Gram, Linearised, grams
+from ...identification.fit.normal_equations import Gram, grams
+from ...identification.training.adjusted_numbers import adjusted_numbers, directions
+from ...identification.training.model_score import score_of
+from ...identification.training.training_data import TrainingData
 from ...model.model import Model
-from .training_data import TrainingData
 
 BY_COST = attrgetter("score.cost")
 """Key that sorts candidates and fitted models, the best one first."""
@@ -74,68 +75,6 @@ class FittedCandidate(Candidate):
     """A candidate that was fitted jointly with the whole model."""
 
     fit: Fit
-
-
-def adjusted_numbers(model: Model, training_data: TrainingData) -> list[str]:
-    """Parameters that a joint fit adjusts: all except fixed ones, a whole delay, and those that are free per record.
-
-    A delay of whole samples was found in the response to a step. A fraction of a sample was fitted, and goes on to be.
-    `settling` of the offset is not adjusted if all records start at one level, because the data do not determine it.
-    """
-    values, skipped = model.values(), {f"{MainsHum.name}.f"}
-    if float(values.get(f"{Arx.name}.delay", 0.0)).is_integer():
-        skipped.add(f"{Arx.name}.delay")
-    if training_data.offset:
-        skipped.add(f"{Offset.name}.y0")
-    if training_data.offset or not training_data.begins_at_levels:
-        skipped.add(f"{Offset.name}.settling")
-    if loop_is_off(model):  # it stays off
-        skipped |= {f"{model.hysteresis.name}.{n}" for n in model.hysteresis.memory_names}
-    rows = {n: model.row(n) for n in values if n not in skipped}
-    return [n for n, row in rows.items() if not (row.fixed or row.per_record)]
-
-
-def loop_is_off(model: Model) -> bool:
-    """Whether the loop of the model is switched off."""
-    return model.has_hysteresis and not model.hysteresis.has_memory
-
-
-def directions(model: Model, names: Sequence[str], extra: int = 0) -> Array:
-    """Columns for `cross_validate`: free parameters at constant G(1), then `extra` rows; none for the residual."""
-    free = gauge(model, names)
-    columns = np.zeros((len(names) + extra + 1, free.shape[1] + extra))
-    columns[: len(names), : free.shape[1]] = free
-    columns[len(names) : len(names) + extra, free.shape[1] :] = np.eye(extra)
-    return columns
-
-
-def score_model(model: Model, training_data: TrainingData, known: Linearised | None = None) -> Score:
-    """Score of a fitted model on records left out; `known` is what `linearised` would find, if a fit has found it."""
-    at = linearised(model, training_data, known)
-    return _score(model, at.names, training_data, at.grams, directions(model, at.names))
-
-
-def score_baseline(fit: Fit, training_data: TrainingData) -> tuple[TrainingData, Score]:
-    """The training data and the score. A record that alone determines a parameter of the model is never left out."""
-    at = linearised(fit.model, training_data, fit.linearised)
-    alone = indispensable(at.grams, training_data.floors, directions(fit.model, at.names))
-    training_data = replace(training_data, alone=alone)
-    return training_data, score_model(fit.model, training_data, at)
-
-
-def linearised(model: Model, training_data: TrainingData, known: Linearised | None = None) -> Linearised:
-    """The model linearised by the parameters that a joint fit adjusts; `known` itself, if it is by these."""
-    names = tuple(adjusted_numbers(model, training_data))
-    if known is not None and known.names == names:
-        return known
-    return Linearised(names, grams(model, training_data.records, names, training_data.free_with(model)))
-
-
-def _score(
-    model: Model, names: Sequence[str], training_data: TrainingData, products: Sequence[Gram], columns: Array
-) -> Score:
-    room = room_of(model, names, columns)
-    return cross_validate(products, training_data.floors, columns, training_data.alone, room)
 
 
 def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Effect]]) -> list[Candidate]:
@@ -229,5 +168,5 @@ def _scored(
     for effect, size in sizes:
         part = columns[:, [*range(kept), *range(first, first + size)]]
         first += size
-        found.append(Candidate(effect, training_data, _score(model, names, training_data, products, part)))
+        found.append(Candidate(effect, training_data, score_of(model, names, training_data, products, part)))
     return found

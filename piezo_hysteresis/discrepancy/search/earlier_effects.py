@@ -27,10 +27,12 @@ import numpy as np
 
 from ...effects import Effect
 from ...identification.records.noise_floor import ADEQUATE
+from ...identification.training.joint_fit import LATER
+from ...identification.training.model_score import Fitted
 from .acceptance_tests import is_certain
 from .candidate_refits import best_of_each, leaves_room, settled, simplest
 from .candidates import FittedCandidate, screen
-from .refit import LATER, Fitted, collected, converged, refit, without
+from .refit import collected, converged, refit, without
 from .selection_result import FAR, NAMED, Step, explained
 
 

@@ -22,14 +22,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial, reduce
 from typing import TypeVar
 
-from ...errors import DivergenceError, IdentificationError, ModelError, ParameterError
 from ...identification.cores import on_cores
-from ...identification.fit.cross_validation import Score
-from ...identification.fit.fit import Fit, fit
 from ...identification.fit.form_uncertainty import LAG
 from ...identification.fit.normal_equations import Linearised, residuals
 from ...identification.fit.time_limit import check_time
@@ -37,63 +33,17 @@ from ...identification.records.noise_floor import ADEQUATE
 from ...identification.steps.dynamics import Dynamics, best_arx, identify_arx
 from ...identification.steps.linear_start import FEW_ITERATIONS, ITERATIONS, dynamics_signals, form_of, with_dynamics
 from ...identification.steps.modes import identify_modes
+from ...identification.training.joint_fit import FAILURES, FIRST, LAST, LATER, PRECISE, TOLERANCE, joint
+from ...identification.training.model_score import Fitted, score_model, scored
+from ...identification.training.training_data import TrainingData
 from ...model.model import Model
-from .candidates import BY_COST, Candidate, FittedCandidate, adjusted_numbers, linearised, score_model
-from .training_data import TrainingData
+from .candidates import BY_COST, Candidate, FittedCandidate
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 LINEAR = (LAG, "dynamics")
 """Families of effects that dynamics of sufficient order can contain."""
-TOLERANCE = 1e-3
-"""Relative decrease of the cost at convergence of a refit."""
-FIRST, LATER = 3, 9
-"""Number of linearisations of a refit, before and after candidates far behind are dropped."""
-LAST, PRECISE = 25, 1e-4
-"""Number of linearisations of a last fit, and relative decrease of the cost at convergence."""
-FAILURES = (DivergenceError, IdentificationError, ModelError, ParameterError)
-"""Errors with which a trial fit may end."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Fitted:
-    """A model, its score, and its linearisation on the same records."""
-
-    model: Model
-    score: Score
-    linearised: Linearised
-
-
-def joint(
-    model: Model,
-    training_data: TrainingData,
-    max_iterations: int,
-    tolerance: float = TOLERANCE,
-    known: Linearised | None = None,
-) -> Fit:
-    """Joint fit of all free parameters of a model to the training data.
-
-    `tolerance` is the relative decrease of the cost at convergence, `known` the linearisation of the model on these
-    records, if there is one. The fit raises one of `FAILURES`, or a TimeSpentError if the time limit of the search has
-    passed.
-    """
-    return fit(
-        model,
-        training_data.records,
-        adjusted_numbers(model, training_data),
-        floors=training_data.floors,
-        nuisance=training_data.free_with(model),
-        max_iterations=max_iterations,
-        tolerance=tolerance,
-        known=known,
-    )
-
-
-def scored(model: Model, training_data: TrainingData, known: Linearised | None = None) -> Fitted:
-    """A model with its score, from its linearisation if it is known."""
-    at = linearised(model, training_data, known)
-    return Fitted(model, score_model(model, training_data, at), at)
 
 
 def collected(

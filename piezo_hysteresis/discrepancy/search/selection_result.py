@@ -22,10 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...identification.fit.cross_validation import Score
+from ...identification.training.training_data import TrainingData
 from ...model.model import Model
 from .candidate_refits import LEAST_GAIN
 from .candidates import Candidate, FittedCandidate
-from .training_data import TrainingData
 
 FAR = 10.0
 """V above which the remaining error is large: a similar effect of another family may explain as much of the gap."""

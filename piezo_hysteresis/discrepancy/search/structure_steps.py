@@ -35,11 +35,12 @@ from ...identification.structure.pole_place import with_pole_behind
 from ...identification.structure.structure_choice import CREEPS, LEADS
 from ...identification.structure.structure_fit import fit_structure
 from ...identification.structure.uncertainty import as_fit
+from ...identification.training.model_score import score_model
+from ...identification.training.training_data import TrainingData
 from ...model.model import Model
 from ...record import Record
-from .candidates import FittedCandidate, score_model
+from .candidates import FittedCandidate
 from .selection_result import Step
-from .training_data import TrainingData
 
 POLES = tuple(form.name for form in AMPLIFIERS)
 """Forms of a pole before the hysteresis."""

@@ -30,9 +30,9 @@ from ...blocks.block import Array
 from ...identification.fit.bounded_step import bounded_step, room_of
 from ...identification.fit.normal_equations import grams
 from ...identification.records.excitation_content import excitation_content
+from ...identification.training.adjusted_numbers import adjusted_numbers, directions
+from ...identification.training.training_data import TrainingData
 from ...model.model import Model
-from ..search.candidates import adjusted_numbers, directions
-from ..search.training_data import TrainingData
 
 GROUPS = 3
 """Groups of similar rate, and of similar amplitude: slow, middle and fast; small, middle and large."""

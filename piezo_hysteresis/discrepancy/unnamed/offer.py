@@ -24,13 +24,13 @@ import numpy as np
 from ...blocks.block import Array
 from ...effects import Creep, Offset, UnnamedCorrection, UnnamedPlays, UnnamedPositionMap, UnnamedRelaxation
 from ...identification.identified_range import identified_range
+from ...identification.training.joint_fit import FAILURES, LAST, PRECISE, joint
+from ...identification.training.training_data import TrainingData
 from ...model.model import Model
 from ...record import Experiment
 from ..gap import gap_between
 from ..search.baseline_setup import BaselineSetup
 from ..search.candidate_refits import LEAST_GAIN
-from ..search.refit import FAILURES, LAST, PRECISE, joint
-from ..search.training_data import TrainingData
 from .correction import Correction, corrections_in
 from .held_out import HeldOut, held_out, rate_and_amplitude_groups
 

@@ -23,12 +23,12 @@ from piezo_hysteresis.discrepancy.choice.next_experiment import best_next_experi
 from piezo_hysteresis.discrepancy.choice.time_to_decide import distances
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, BoucWen, Creep, Offset, SensorNonlinearity, Softening, ThermalDrift
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
+from piezo_hysteresis.identification.training.training_data import TrainingData
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 

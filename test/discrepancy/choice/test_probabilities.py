@@ -40,13 +40,13 @@ from piezo_hysteresis.discrepancy.choice.time_to_decide import (
 )
 from piezo_hysteresis.discrepancy.search.candidates import Candidate, FittedCandidate
 from piezo_hysteresis.discrepancy.search.selection_result import Selection, Step
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.discrepancy.verdict import Verdict
 from piezo_hysteresis.effects import Arx, Backlash, BoucWen, Creep, MainsHum, ThermalDrift
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.identification.training.training_data import TrainingData
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 

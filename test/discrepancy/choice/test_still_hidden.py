@@ -21,10 +21,10 @@ import pytest
 
 from piezo_hysteresis.discrepancy.choice.still_hidden import still_hidden
 from piezo_hysteresis.discrepancy.choice.tiers import tiers
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import Arx, BoucWen, Creep, Offset, ThermalDrift
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.identification.training.training_data import TrainingData
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 

@@ -26,8 +26,6 @@ from piezo_hysteresis.discrepancy.search.acceptance_tests import (
 )
 from piezo_hysteresis.discrepancy.search.candidate_refits import bends_all_along, simplest
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
-from piezo_hysteresis.discrepancy.search.refit import Fitted
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import (
     AmplifierSaturation,
     Backlash,
@@ -41,6 +39,8 @@ from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.fit.fit import Fit
 from piezo_hysteresis.identification.fit.normal_equations import Linearised
+from piezo_hysteresis.identification.training.model_score import Fitted
+from piezo_hysteresis.identification.training.training_data import TrainingData
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 

@@ -20,9 +20,8 @@ import numpy as np
 import pytest
 import scipy
 
-from piezo_hysteresis.discrepancy.search.candidates import Candidate, score_model
+from piezo_hysteresis.discrepancy.search.candidates import Candidate
 from piezo_hysteresis.discrepancy.search.refit import proceed, refit, restart, without
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import (
     HYSTERESIS,
     AmplifierBandwidth,
@@ -35,6 +34,8 @@ from piezo_hysteresis.effects import (
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.records.noise_floor import ADEQUATE
+from piezo_hysteresis.identification.training.model_score import score_model
+from piezo_hysteresis.identification.training.training_data import TrainingData
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 

@@ -25,12 +25,11 @@ from hypothesis import strategies as st
 from piezo_hysteresis.discrepancy.search import earlier_effects
 from piezo_hysteresis.discrepancy.search.acceptance_tests import is_certain
 from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, leaves_room, refits_of_relatives
-from piezo_hysteresis.discrepancy.search.candidates import Candidate, score_model
+from piezo_hysteresis.discrepancy.search.candidates import Candidate
 from piezo_hysteresis.discrepancy.search.earlier_effects import certain, in_best_laws
-from piezo_hysteresis.discrepancy.search.refit import LATER, refit
+from piezo_hysteresis.discrepancy.search.refit import refit
 from piezo_hysteresis.discrepancy.search.selection import select
 from piezo_hysteresis.discrepancy.search.selection_result import FAR, Selection, Step, explained
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import (
     CATALOGUE,
     HYSTERESIS,
@@ -46,6 +45,9 @@ from piezo_hysteresis.effects import (
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.cross_validation import Score
 from piezo_hysteresis.identification.records.noise_floor import ADEQUATE
+from piezo_hysteresis.identification.training.joint_fit import LATER
+from piezo_hysteresis.identification.training.model_score import score_model
+from piezo_hysteresis.identification.training.training_data import TrainingData
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 

@@ -27,9 +27,6 @@ from piezo_hysteresis.blocks.relaxation import RelaxationBlock
 from piezo_hysteresis.discrepancy.diagnose import compare_with_given_model
 from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
 from piezo_hysteresis.discrepancy.search.baseline_setup import BaselineSetup
-from piezo_hysteresis.discrepancy.search.candidates import score_baseline
-from piezo_hysteresis.discrepancy.search.refit import LAST, joint
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.discrepancy.unnamed.correction import Correction, without_corrections
 from piezo_hysteresis.discrepancy.unnamed.held_out import held_out
 from piezo_hysteresis.discrepancy.unnamed.offer import best_correction, fitted_correction
@@ -48,6 +45,9 @@ from piezo_hysteresis.effects import (
 from piezo_hysteresis.effects.extent import Extent
 from piezo_hysteresis.identification.fit.normal_equations import residuals
 from piezo_hysteresis.identification.identified_range import outside_of
+from piezo_hysteresis.identification.training.joint_fit import LAST, joint
+from piezo_hysteresis.identification.training.model_score import score_baseline
+from piezo_hysteresis.identification.training.training_data import TrainingData
 from piezo_hysteresis.model import model_file
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.parameter import Parameter

@@ -19,10 +19,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.search.candidates import adjusted_numbers
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData, choose_test_records
 from piezo_hysteresis.effects import Arx, BoucWen, Offset
 from piezo_hysteresis.effects.extent import Extent
+from piezo_hysteresis.identification.training.adjusted_numbers import adjusted_numbers
+from piezo_hysteresis.identification.training.training_data import TrainingData, choose_test_records
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
 

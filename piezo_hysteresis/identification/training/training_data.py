@@ -24,14 +24,14 @@ import numpy as np
 
 from ...blocks.block import Array
 from ...effects.extent import Extent
-from ...identification.fit.normal_equations import Nuisance
-from ...identification.free_run_error import free_per_record
-from ...identification.records.conditioning import with_conditioning
-from ...identification.records.excitation_check import moves
-from ...identification.records.excitation_content import excitation_content
-from ...identification.records.leading_step import step_length
 from ...model.model import Model
 from ...record import Record
+from ..fit.normal_equations import Nuisance
+from ..free_run_error import free_per_record
+from ..records.conditioning import with_conditioning
+from ..records.excitation_check import moves
+from ..records.excitation_content import excitation_content
+from ..records.leading_step import step_length
 
 PER_TEST_RECORD = 3
 """Number of records of a kind per test record."""

@@ -20,8 +20,6 @@ import numpy as np
 import pytest
 
 from piezo_hysteresis.discrepancy import diagnose
-from piezo_hysteresis.discrepancy.explicit_step import KIND, explicit_model, step_changes, without_steps
-from piezo_hysteresis.discrepancy.search.training_data import TrainingData
 from piezo_hysteresis.effects import (
     AmplifierBandwidth,
     Arx,
@@ -32,6 +30,8 @@ from piezo_hysteresis.effects import (
     RateDependentHysteresis,
 )
 from piezo_hysteresis.effects.extent import Extent
+from piezo_hysteresis.identification.training.explicit_step import KIND, explicit_model, step_changes, without_steps
+from piezo_hysteresis.identification.training.training_data import TrainingData
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
 

@@ -27,18 +27,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..blocks.block import Array
-from ..effects import BoucWen
-from ..effects.hysteresis.explicit_bouc_wen import ExplicitBoucWen
-from ..identification.fit.cross_validation import cross_validate
-from ..identification.fit.normal_equations import grams
-from ..identification.records.conditioning import with_conditioning
-from ..identification.records.sampling import at_period, is_faster, less
-from ..model.model import Model
-from ..record import Experiment, Notice, Record
-from .search.candidates import adjusted_numbers, directions
-from .search.refit import FAILURES, LATER, joint
-from .search.training_data import TrainingData
+from ...blocks.block import Array
+from ...effects import BoucWen
+from ...effects.hysteresis.explicit_bouc_wen import ExplicitBoucWen
+from ...model.model import Model
+from ...record import Experiment, Notice, Record
+from ..fit.cross_validation import cross_validate
+from ..fit.normal_equations import grams
+from ..records.conditioning import with_conditioning
+from ..records.sampling import at_period, is_faster, less
+from .adjusted_numbers import adjusted_numbers, directions
+from .joint_fit import FAILURES, LATER, joint
+from .training_data import TrainingData
 
 KIND = "explicit_step"
 """Kind of the notice about an experiment from which the error was subtracted."""
