@@ -28,6 +28,7 @@ from ...identification.fit.fit import Progress
 from ...identification.fit.normal_equations import residuals
 from ...identification.fit.time_limit import TimeSpentError
 from ...identification.records.noise_floor import ADEQUATE
+from ...identification.training.model_score import Fitted
 from ...identification.training.training_data import TrainingData
 from ...model.model import Model
 from .acceptance_tests import first_rejection
@@ -45,7 +46,7 @@ from .candidate_refits import (
 )
 from .candidates import Candidate, FittedCandidate, screen
 from .earlier_effects import certain, in_best_laws
-from .refit import Fitted, converged, without
+from .refit import converged, without
 from .selection_result import Selection, Step
 
 REFITS = 6

@@ -107,6 +107,18 @@ def steps_with(order, hidden):
     return steps
 
 
+def test_a_search_begins_again_from_the_model_that_was_refitted_without_a_refused_effect():
+    """A loop was fitted as far as V = 1.8 and an exponent was refused; refitted without it, the loop had V = 0.5."""
+    (step,) = steps_with((CREEP,), ())
+    right = step.best.fit.model.without(CREEP.name)
+    start = right.with_effect(right.hysteresis.with_values(beta=0.5 * right.hysteresis["beta"]))
+    data = step.best.training_data
+    found = select(start, data, score_model(start, data), [Creep])
+    assert found.accepted == ()
+    assert found.baseline is not start
+    assert found.score.excess < ADEQUATE
+
+
 @pytest.mark.parametrize("hidden", [(CREEP,), (DRIFT, CREEP)])
 def test_an_effect_that_a_later_one_makes_superfluous_is_taken_back(hidden):
     """Of a stage with creep, drift was named first and stayed beside it, with an interval from −17 to 19 times."""
