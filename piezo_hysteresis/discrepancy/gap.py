@@ -131,8 +131,8 @@ class Gap:
 def gap_answer(gap: Gap | None) -> dict[str, Any]:
     """The gap as in ``answer.json``, in % of range; without values if there is none."""
     if gap is None:
-        unknown = dict.fromkeys(("before", "after", "live", "floor", "after_interval_95"))
-        return {**unknown, "unseen": False, "per_phase": {}}
+        unknown = ("before", "after", "live", "floor", "after_interval_95")
+        return dict.fromkeys(unknown) | {"unseen": False, "per_phase": {}}
     return {
         "before": gap.before,
         "after": gap.after,

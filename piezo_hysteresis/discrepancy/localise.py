@@ -94,8 +94,7 @@ def localise(
         Ordered by concentration of the residual in comparison with evenly distributed power.
     """
     power = [e * e / (f * f * e.size) for e, f in zip(residuals, floors, strict=True)]
-    total = sum(float(p.sum()) for p in power)
-    if total == 0.0:
+    if not any(p.any() for p in power):
         return ()
     spectra = [_one_sided(e) / (f * f) for e, f in zip(residuals, floors, strict=True)]
     lines = [np.searchsorted(FREQUENCIES, np.fft.rfftfreq(r.size, r.sample_period), side="right") - 1 for r in records]
@@ -131,8 +130,7 @@ def _place(
     axis: str, labels: Sequence[str], bins: Sequence[Bins], power: Sequence[Array]
 ) -> tuple[ResidualShare, float]:
     """Shares along one axis, and their concentration: the difference between the shares of power and of samples."""
-    held = np.zeros(len(labels))
-    room = np.zeros(len(labels))
+    held, room = np.zeros((2, len(labels)))
     for index, p in zip(bins, power, strict=True):
         known = index >= 0
         held += np.bincount(index[known], p[known], len(labels))

@@ -36,7 +36,7 @@ from .choice.next_experiment import best_next_experiment
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
 from .gap import Gap, gap_between
-from .localise import ResidualShare, located
+from .localise import located
 from .search.baseline_setup import BaselineSetup, prepare_baseline
 from .search.refit import restart
 from .search.selection import select
@@ -67,50 +67,34 @@ def diagnose_many(state: DiagnosisState) -> Diagnosis:
     two are compared with everything that is found beside them. The search is repeated if time is left and the model
     that was found corrects averaged samples differently.
     """
-    setup = _baseline(state)
-    selection = _search(state, setup)
+    setup, selection = _searched(state)
     models = [setup.baseline.model] if setup.score.excess > ADEQUATE else []
     models += [s.best.fit.model for s in selection.accepted if s.best.score.excess > ADEQUATE]
     for explicit in filter(None, (explicit_model(model, setup.training_data) for model in models)):
-        freed = _freed(state, explicit)
-        if selection.score.excess < BETTER * freed[2].score.excess:
+        freed = replace(state, experiment=without_steps(state.experiment, explicit))
+        found = _searched(freed)
+        if selection.score.excess < BETTER * found[1].score.excess:
             continue
         if not state.explicit_step:
             model = selection.baseline
-            where = _where(state, setup, model)
+            where = located(model, setup.records, setup.fitted, setup.least)
             return Diagnosis(Conclusion.INSUFFICIENT_DATA, EXPLICIT, model, model, state.experiment, where=where)
-        state, setup, selection = freed
+        state, (setup, selection) = freed, found
         break
     extends = selection.in_time and selection.accepted and state.corrects_intersample_error
     if extends and setup.changes_intersample_error(selection.model):
-        sharper = _baseline(state, selection)
-        again = _search(state, sharper)
+        sharper, again = _searched(state, selection)
         setup, selection = (sharper, again) if again.in_time else (setup, selection)
     return _concluded(state, setup, selection)
 
 
-def _freed(state: DiagnosisState, explicit: Model) -> tuple[DiagnosisState, BaselineSetup, Selection]:
-    """The data without the error of an explicit step, their baseline, and what is found in them."""
-    state = replace(state, experiment=without_steps(state.experiment, explicit))
-    setup = _baseline(state)
-    return state, setup, _search(state, setup)
-
-
-def _baseline(state: DiagnosisState, known: Selection | None = None) -> BaselineSetup:
-    """Floors, test records, and the published model fitted to the others."""
+def _searched(state: DiagnosisState, known: Selection | None = None) -> tuple[BaselineSetup, Selection]:
+    """The published model fitted to the training records, and the effects that a search adds to it."""
     corrects, progress = state.corrects_intersample_error, state.progress
-    return prepare_baseline(state.experiment.records, state.usable, state.model, known, corrects, progress)
-
-
-def _search(state: DiagnosisState, setup: BaselineSetup) -> Selection:
+    setup = prepare_baseline(state.experiment.records, state.usable, state.model, known, corrects, progress)
     model, data = setup.baseline.model, setup.training_data
     with ending_at(state.end):
-        return select(model, data, setup.score, state.effects, lambda w, f: state.progress(w, 0.4 + 0.4 * f))
-
-
-def _where(state: DiagnosisState, setup: BaselineSetup, model: Model) -> tuple[ResidualShare, ...]:
-    state.progress("location of the residual", 0.82)
-    return located(model, setup.records, setup.fitted, setup.least)
+        return setup, select(model, data, setup.score, state.effects, lambda w, f: progress(w, 0.4 + 0.4 * f))
 
 
 def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection) -> Diagnosis:
@@ -119,7 +103,8 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
     The gap before is the own error of a given model, not that after a joint fit. It stays the model where no effect is
     named and the joint fit predicts the test records worse.
     """
-    where, given = _where(state, setup, selection.baseline), state.model
+    state.progress("location of the residual", 0.82)
+    where, given = located(selection.baseline, setup.records, setup.fitted, setup.least), state.model
     state.progress("gap", 0.85)
     whole, noise = setup.for_last_fit()
     named = is_explained(selection)

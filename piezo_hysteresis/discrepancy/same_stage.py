@@ -62,8 +62,7 @@ def same_stage(state: DiagnosisState, model: Model) -> Diagnosis | Notice | None
             return _without_change(model, records, used, limits) if known else None
         changed = changed_model(model, change, records)
         where = located(model, records, used, least, offset=True)
-        both, span = (model, changed), stroke(records)
-        gap = measure_gap(both, records, used, least, span, unseen=False, offset=True)
+        gap = measure_gap((model, changed), records, used, least, stroke(records), unseen=False, offset=True)
     except (DivergenceError, ModelError, ParameterError):
         return None
     if not gap.after < gap.before:

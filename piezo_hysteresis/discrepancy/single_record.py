@@ -74,10 +74,7 @@ ONLY_A_LAG = (
 
 
 def diagnose_few(state: DiagnosisState) -> Diagnosis:
-    """Extend the best model while cross-validation improves, and name the effects that are certain.
-
-    Without a given model, one is identified from the prepared records.
-    """
+    """Extend the best model while cross-validation improves, and name the effects that are certain."""
     given, experiment = state.model, state.experiment
     setup, model, found = _start(state)
     several = has_several_drives(setup.records, setup.fitted)

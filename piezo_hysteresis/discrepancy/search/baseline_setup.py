@@ -12,10 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The starting point of a diagnosis.
-
-Records with their floors, split and shortened, and the baseline fitted to them.
-"""
+"""`BaselineSetup`: records with their floors, split and shortened, and the baseline fitted to them."""
 
 from __future__ import annotations
 

@@ -107,18 +107,15 @@ def starts_of(effect: type[Effect], extent: Extent) -> tuple[Effect, ...]:
         return ()
 
 
-def _screen_group(model: Model, training_data: TrainingData, base: list[str], group: list[Effect]) -> list[Candidate]:
-    """Score test of effects that share one pass over the data."""
-    screened = _screen_off if group[0].is_off else _screen_moves
-    return screened(model, training_data, base, group)
-
-
 def _fits(model: Model, training_data: TrainingData, effect: type[Effect]) -> bool:
     has_channel = effect.channel is None or any(effect.channel in r.channels for r in training_data.records)
     return effect.name not in model and has_channel and (effect.host is None or effect.host in model)
 
 
-def _screen_off(model: Model, training_data: TrainingData, base: list[str], members: list[Effect]) -> list[Candidate]:
+def _screen_group(model: Model, training_data: TrainingData, base: list[str], members: list[Effect]) -> list[Candidate]:
+    """Score test of effects that share one pass over the data."""
+    if not members[0].is_off:
+        return _screen_moves(model, training_data, base, members)
     extended = model
     for effect in list(members):
         try:
