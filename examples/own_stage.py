@@ -69,7 +69,7 @@ class OwnStage:
         )
         self._limiter = Limiter(self._description)
         self._put, self._get = put, get
-        self._sample_period, self._voltage, self._due, self._closed = 1e-3, 0.0, 0.0, False
+        self._sample_period, self._voltage, self._due, self._moved, self._closed = 1e-3, 0.0, 0.0, 0.0, False
 
     @property
     def description(self) -> Description:
@@ -147,9 +147,12 @@ class OwnStage:
                 self._move(float(level))
                 time.sleep(1e-3)
 
+    # After a delay `exchange` catches up. Many samples at once would be a step: the slew limit holds in real time, too.
     def _move(self, voltage: float) -> None:
+        fastest = abs(voltage - self._voltage) / self._limiter.limits.max_slew_rate
+        time.sleep(max(self._moved + fastest - time.monotonic(), 0.0))
         self._put(voltage)
-        self._voltage = voltage
+        self._voltage, self._moved = voltage, time.monotonic()
 
     def _require_open(self) -> None:
         if self._closed:

@@ -18,8 +18,10 @@ import ast
 import runpy
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import numpy as np
 import yaml
 
 from piezo_hysteresis import recording
@@ -57,6 +59,24 @@ def test_hide_effect_prints_no_answer_and_writes_the_plant_of_the_seed(tmp_path)
 def test_own_stage(capsys):
     runpy.run_path(str(EXAMPLES / "own_stage.py"), run_name="__main__")
     assert capsys.readouterr().out == "50 samples, 23.5 µm, 0 V at the end\n"
+
+
+def test_own_stage_keeps_its_slew_limit_in_real_time():
+    """After a delay it caught up with samples that had no time between them."""
+    slew, put, delays = 100.0, [], iter([0.1])
+
+    def get():
+        if len(put) == 20:
+            time.sleep(next(delays, 0.0))
+        return 0.0
+
+    own_stage = runpy.run_path(str(EXAMPLES / "own_stage.py"))["OwnStage"]
+    stage = own_stage("bench 3", lambda volts: put.append((time.monotonic(), volts)), get, 10.0, slew)
+    stage.exchange(np.arange(1, 121) * 0.5 * slew * stage.sample_period)
+    stage.close()
+    at, voltage = np.array(put).T
+    assert voltage.max() == 6.0
+    assert (np.abs(np.diff(voltage)) <= slew * np.diff(at) + 1e-9).all()
 
 
 def test_ten_lines_send_a_scan():
