@@ -193,7 +193,7 @@ class StreamingAcquisition:
                     self._safe.set()
             if not self._safe.is_set():  # `make_safe` has given up, because a call of the stage took too long
                 self._go_safe()
-        except Exception as error:  # after any exception the stage must not keep its voltage
+        except BaseException as error:  # the stage must not keep its voltage, also if a library ends the thread
             failure = self._abandon(error)
             self._fail(failure)
             self._end_commands(str(failure))
@@ -207,10 +207,10 @@ class StreamingAcquisition:
         if not self._keeper.has_stage:
             self.stage.safe()
 
-    def _abandon(self, error: Exception) -> PiezoError:
+    def _abandon(self, error: BaseException) -> PiezoError:
         try:
             self._go_safe()
-        except Exception as unsafe:
+        except BaseException as unsafe:
             return StageError(f"{error}; the stage could not be brought to its safe voltage: {unsafe}")
         return error if isinstance(error, PiezoError) else StageError(f"fault of the driver: {error!r}")
 

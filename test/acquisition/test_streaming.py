@@ -16,6 +16,7 @@
 
 import threading
 import time
+from asyncio import CancelledError
 from dataclasses import replace
 
 import numpy as np
@@ -122,6 +123,25 @@ def test_a_fault_of_the_program_leaves_the_stage_safe_too():
     listener.wait(lambda heard: heard.failures)
     assert "ZeroDivisionError" in str(listener.failures[0])
     assert stage.made_safe == 1
+
+
+@pytest.mark.parametrize("end", [SystemExit, CancelledError])
+def test_a_library_that_ends_the_thread_does_not_leave_the_stage_energised(end):
+    """These are no `Exception`: the thread ended without a word, at the voltage that it had reached."""
+    stage = Witness(PERIOD, RAMP_RATE)
+    exchange = stage.exchange
+
+    def fails_on_its_way(voltage):
+        if stage.voltage > 1.0:
+            raise end("library of the device")
+        return exchange(voltage)
+
+    stage.exchange = fails_on_its_way
+    acquisition, listener = started(stage)
+    acquisition.ramp_to(5.0)
+    listener.wait(lambda heard: heard.failures)
+    assert "library of the device" in str(listener.failures[0])
+    assert (stage.made_safe, stage.voltage) == (1, 0.0)
 
 
 def test_a_stall_is_caught_up_with_by_count():

@@ -119,7 +119,7 @@ def _make_safe(stage: Stage, order: Mapping[str, Any]) -> int:
             if order["ends_driver"]:  # only the driver had used the device: read the present voltage first
                 stage = _opened(order)
             stage.safe()
-        except Exception as error:  # whatever failed, the next attempt may reach the safe voltage
+        except BaseException as error:  # whatever failed, the next attempt may reach the safe voltage
             _report(reason_of(error))
             time.sleep(_BETWEEN_ATTEMPTS)
         else:
