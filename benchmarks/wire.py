@@ -194,6 +194,14 @@ def _device(word: str, **options) -> Iterator[tuple[str, dict, WireStage | None,
         yield "simulated", values("simulated", memory=memory, longest_block=50_000, dead_time=0.0), None, None
 
 
+def leave_at(word: str, emulated: Any, voltage: float) -> None:
+    """Leave the output of an emulated device at a voltage [V], as a program that has ended does."""
+    if word == "gcs2":
+        emulated.carry_out(f"SVA 1 {voltage * GAIN}")
+    else:
+        emulated.set(voltage)
+
+
 def driver_process(folder: Path, word: str, parameters: dict, timeout: float) -> subprocess.Popen:
     """A driver without ROS in a process of its own, `piezo record`; what it says is in ``folder/log``."""
     ours = {"stage": word, "sample_period": PERIOD, "max_slew_rate": SLEW, "ramp_rate": RAMP, "voltage_max": TOP}

@@ -87,7 +87,7 @@ class DriverSession:
         if read is not None:
             opening = replace(opening, read=read)
         try:
-            self.stage = open_stage(settings.stage, values, opening, self._lock_device)
+            self.stage = open_stage(settings.stage, values, opening, self._lock_device, settings.slowest_rate)
         except BaseException:
             self._lock.release()
             raise

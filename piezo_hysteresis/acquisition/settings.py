@@ -187,6 +187,11 @@ class DriverSettings:
             )
         return replace(stage, voltage_min=low, voltage_max=high, max_slew_rate=slew, longest_block=None)
 
+    @property
+    def slowest_rate(self) -> float:
+        """Rate that keeps `ramp_rate` and `max_slew_rate` [V/s], also where these contradict one another."""
+        return min(self.ramp_rate, self.max_slew_rate or math.inf)
+
     def block_size(self, sample_period: float) -> int:
         """Number of samples per message, at least one."""
         return max(1, round(self.block_duration / sample_period))

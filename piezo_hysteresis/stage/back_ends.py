@@ -20,6 +20,7 @@ found here without being listed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
@@ -43,7 +44,11 @@ BACK_ENDS: Mapping[str, BackEnd] = {b.word: b for b in sorted(_found(), key=lamb
 
 
 def open_stage(
-    word: str, values: Mapping[str, Any], opening: Opening, lock: Callable[[Description], None] = lambda found: None
+    word: str,
+    values: Mapping[str, Any],
+    opening: Opening,
+    lock: Callable[[Description], None] = lambda found: None,
+    ramp_rate: float = math.inf,
 ) -> Stage:
     """Open a stage at a sample period.
 
@@ -58,11 +63,14 @@ def open_stage(
     lock : callable, optional
         Takes the description of the stage before anything else is done with it. If it raises an error, the stage is
         released as it was found, because another program drives it.
+    ramp_rate : float, optional
+        Rate of the way to the safe voltage [V/s] until `Stage.restrict` sets another one; by default, and at most, the
+        steepest slew of the stage.
 
     Raises
     ------
     PiezoError
-        If the stage cannot be opened with these values. A stage that was opened is closed again.
+        If the stage cannot be opened with these values. A stage that was opened is closed again, at `ramp_rate`.
     """
     if opening.real_time_factor != 1.0 and BACK_ENDS[word].is_device:
         raise ParameterError(
@@ -76,6 +84,7 @@ def open_stage(
         stage.leave()
         raise
     try:
+        stage.restrict(stage.description, ramp_rate)
         stage.configure(opening.sample_period or stage.sample_period)
     except BaseException:
         stage.close()

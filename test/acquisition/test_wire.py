@@ -22,15 +22,16 @@ import numpy as np
 import pytest
 
 from benchmarks.wire import (
-    GAIN,
     LSB,
     PERIOD,
     RAMP,
     SAFE_WITHIN,
+    SLEW,
     TOP,
     WiredSession,
     check_wire,
     device,
+    leave_at,
     settings,
     values,
 )
@@ -229,14 +230,6 @@ def test_a_fault_in_mid_waveform(wired, word, fault):
     check_wire(s.wire)
 
 
-def leave_at(word, emulated, voltage):
-    """A program that has ended has left the output there."""
-    if word == "gcs2":
-        emulated.carry_out(f"SVA 1 {voltage * GAIN}")
-    else:
-        emulated.set(voltage)
-
-
 @pytest.mark.parametrize("word", ["gcs2", "nidaqmx"])
 def test_the_next_start_at_a_voltage_that_a_killed_driver_has_left(word):
     with device(word) as (name, parameters, amplifier, (emulated, _)):
@@ -273,6 +266,29 @@ def test_a_stage_that_was_left_outside_the_limits_of_the_driver_is_first_made_sa
         s.wait(lambda: abs(s.output - 1.0) <= SAFE_WITHIN, "the first set-point")
         assert not s.failures
         s.end()
+
+
+@pytest.mark.parametrize(
+    ("word", "wrong"),
+    [
+        ("gcs2", {"sample_period": 1.3 * PERIOD}),
+        ("gcs2", {"voltage_max": 50.0}),
+        ("nidaqmx", {"voltage_max": 50.0}),
+        ("nidaqmx", {"ramp_rate": 2 * SLEW}),
+    ],
+)
+def test_a_driver_whose_settings_are_refused_makes_the_stage_safe_within_its_rates(word, wrong):
+    """It knew no limits but those of the device, and went to the safe voltage in one step."""
+    with device(word) as (name, parameters, amplifier, (emulated, _)):
+        leave_at(word, emulated, TOP)
+        since = len(amplifier.parts)
+        with pytest.raises((ParameterError, StageError), match="got"):
+            WiredSession(name, parameters, amplifier, **wrong)
+        fall = SLEW if "ramp_rate" in wrong else RAMP
+        steps = np.diff(np.concatenate([np.full(1, TOP), *amplifier.parts[since:]]))
+        assert steps.max() <= 2 * LSB
+        assert steps.min() >= -fall * PERIOD - 2 * LSB
+        assert abs(amplifier.output) <= SAFE_WITHIN
 
 
 def test_a_card_that_shows_nothing_about_its_output_is_refused_unless_allowed():
