@@ -16,6 +16,8 @@
 
 import re
 import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -289,6 +291,24 @@ def test_a_driver_whose_settings_are_refused_makes_the_stage_safe_within_its_rat
         assert steps.max() <= 2 * LSB
         assert steps.min() >= -fall * PERIOD - 2 * LSB
         assert abs(amplifier.output) <= SAFE_WITHIN
+
+
+def test_a_controller_that_another_program_stops_on_the_way_to_safety_makes_no_step():
+    """Its ramp counted as played, and the rest of the way was one step."""
+    with device("gcs2") as (name, parameters, amplifier, (controller, _)):
+        s = WiredSession(name, parameters, amplifier, ramp_rate=5.0)
+        leave_at("gcs2", controller, TOP)
+        begin = s.wire.size
+        with ThreadPoolExecutor(1) as other, suppress(StageError):
+            safe = other.submit(s.session.stage.safe)
+            s.wait(lambda: s.output < 0.7 * TOP, "the way to the safe voltage")
+            controller.carry_out("\x18")
+            controller.carry_out("ERR?")  # the other program reads its error
+            safe.result(30.0)
+        s.session.stage.safe()
+        assert abs(s.output) <= SAFE_WITHIN
+        assert np.abs(np.diff(s.wire[begin:])).max() <= 5.0 * PERIOD + 2 * LSB
+        s.end()
 
 
 def test_a_card_that_shows_nothing_about_its_output_is_refused_unless_allowed():

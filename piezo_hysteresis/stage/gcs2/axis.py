@@ -167,11 +167,13 @@ class Axis:
             if time.monotonic() > due:
                 raise Gcs2Error(f"{self.client.connection.place}: still plays {s.timeout:g} s after the end of a ramp")
             time.sleep(_POLL)
+        # another program may have stopped it on the way; a line that the controller draws ends one step before its end
+        self.require_voltage(float(line[-1]), margin=abs(float(line[-1] - line[-2])))
         self.set_voltage(float(line[-1]))
 
-    def require_voltage(self, drive: float) -> None:
-        """Gcs2Error unless ``VOL?`` reaches the drive voltage [V] within the settling time."""
-        tolerance = self.setup.voltage_tolerance / abs(self.setup.amplifier_gain)
+    def require_voltage(self, drive: float, margin: float = 0.0) -> None:
+        """Gcs2Error unless ``VOL?`` reaches the drive voltage [V] in the settling time, within tolerance and margin."""
+        tolerance = self.setup.voltage_tolerance / abs(self.setup.amplifier_gain) + margin
         due = time.monotonic() + self.setup.settling_time
         while abs((measured := self.voltage()) - drive) > tolerance:
             left = due - time.monotonic()
