@@ -149,8 +149,8 @@ class DriverSession:
         else:
             acquisition = MemoryAcquisition(*arguments, rest_period=1 / settings.live_rate)
         _STREAMING.add(self)
+        self._acquisition = acquisition  # before the thread, so that an interrupt between the two cannot forget it
         acquisition.start()
-        self._acquisition = acquisition
         return acquisition
 
     @property
@@ -248,6 +248,8 @@ class DriverSession:
 
     def _close_stage(self) -> None:
         keeper = self._keeper
+        if keeper is not None:
+            keeper.let_finish()  # it may have acted before the stream began: only one process may move the stage
         try:
             self.stage.close()
         except BaseException as error:

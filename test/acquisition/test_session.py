@@ -21,8 +21,23 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks.wire import LSB, PERIOD, RAMP, SAFE_WITHIN, WiredSession, check_wire, device, settings, values
+from benchmarks.wire import (
+    LSB,
+    PERIOD,
+    RAMP,
+    SAFE_WITHIN,
+    TOP,
+    WiredSession,
+    check_wire,
+    device,
+    leave_at,
+    settings,
+    values,
+)
+from piezo_hysteresis.acquisition.safety.keeper import READY
+from piezo_hysteresis.acquisition.safety.keeper_link import KeeperLink
 from piezo_hysteresis.acquisition.session import DriverSession
+from piezo_hysteresis.acquisition.streaming import StreamingAcquisition
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.record import Record
 from piezo_hysteresis.stage.daqmx.daqmx_error import DaqmxError
@@ -31,6 +46,9 @@ from piezo_hysteresis.stage.gcs2.connection import Gcs2Error
 pytestmark = pytest.mark.device
 
 pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
+
+SLOW = 5.0
+"""Rate of a way to the safe voltage that takes longer than a keeper waits [V/s]."""
 
 
 def held(s, voltage=4.0):
@@ -76,6 +94,61 @@ def test_an_interrupt_on_the_way_to_safety_is_followed_by_a_complete_close(word,
         assert abs(s.output) <= SAFE_WITHIN
         check_wire(s.wire)
         assert not s.failures
+
+
+def test_an_interrupt_in_the_moment_of_the_start_is_followed_by_a_complete_close(monkeypatch):
+    """The session did not know its thread yet, and closed the stage under it."""
+    with device("gcs2") as (name, parameters, amplifier, _):
+        s = WiredSession(name, parameters, amplifier)
+        start, begun = StreamingAcquisition.start, []
+
+        def interrupted(acquisition):
+            start(acquisition)
+            begun.append(acquisition)
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(StreamingAcquisition, "start", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            s.start()
+        s.session.close()
+        assert not begun[0]._thread.is_alive()
+        assert not s.failures
+
+
+def test_an_interrupt_while_the_keeper_starts_leaves_the_stage_to_the_driver_alone(monkeypatch):
+    """The keeper heard nothing and moved the stage, too: two ramps at once, and a step between them."""
+    with device("gcs2") as (name, parameters, amplifier, (controller, _)):
+        leave_at("gcs2", controller, TOP)
+        begin, started, keepers = amplifier.wire.size, KeeperLink._started, []
+
+        def interrupted(keeper, order):
+            keepers.append(keeper)
+            assert started(keeper, order) == READY
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(KeeperLink, "_started", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            WiredSession(name, parameters, amplifier, keeper_timeout=0.3, ramp_rate=SLOW)
+        assert keepers[0]._process.poll() is not None
+        assert abs(amplifier.output) <= SAFE_WITHIN
+        assert np.abs(np.diff(amplifier.wire[begin:])).max() <= SLOW * PERIOD + 2 * LSB
+
+
+def test_a_driver_that_is_closed_while_its_keeper_acts_waits_for_it(monkeypatch):
+    """It was silent between configure and activate, for example suspended."""
+    with device("gcs2") as (name, parameters, amplifier, (controller, _)):
+        leave_at("gcs2", controller, TOP)
+        begin = amplifier.wire.size
+        s = WiredSession(name, parameters, amplifier, keeper_timeout=1.0, ramp_rate=SLOW)
+        stage, keeper, ends = s.session.stage, s.session._keeper, []
+        close = stage.close
+        monkeypatch.setattr(stage, "close", lambda: ends.append(keeper._process.poll()) or close())
+        keeper._until = 0.0  # no further heartbeats
+        s.wait(lambda: s.output < 0.9 * TOP, "the keeper")
+        s.session.close()
+        assert ends == [0], "the keeper had ended before the driver used the stage"
+        assert abs(s.output) <= SAFE_WITHIN
+        assert np.abs(np.diff(amplifier.wire[begin:])).max() <= SLOW * PERIOD + 2 * LSB
 
 
 @pytest.mark.parametrize("word", ["gcs2", "nidaqmx"])

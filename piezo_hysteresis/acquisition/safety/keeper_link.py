@@ -114,17 +114,22 @@ class KeeperLink:
         self._orders = cast(IO[bytes], self._process.stdin)
         self._answers = cast(IO[bytes], self._process.stdout)
         self._pipe = self._orders.fileno()
-        answer = self._started(json.dumps(order))
-        if answer != READY:
+        self._beats = threading.Thread(target=self._beat, name="heartbeat", daemon=True)
+        try:
+            answer = self._started(json.dumps(order))
+            if answer != READY:
+                raise StageError(
+                    f"the keeper cannot hold the stage ({answer}), expected a second connection to it; free one, or "
+                    "set keeper_timeout to 0 to go without a keeper"
+                )
+            os.set_blocking(self._pipe, False)
+            self._beats.start()
+        except BaseException:  # an interrupt, too: the keeper must not move the stage while this driver closes it
+            self._ended.set()
             self._process.kill()
             self._process.wait()
-            raise StageError(
-                f"the keeper cannot hold the stage ({answer}), expected a second connection to it; free one, or set "
-                "keeper_timeout to 0 to go without a keeper"
-            )
-        os.set_blocking(self._pipe, False)
-        self._beats = threading.Thread(target=self._beat, name="heartbeat", daemon=True)
-        self._beats.start()
+            self._close_pipes()
+            raise
 
     @property
     def is_lost(self) -> bool:
