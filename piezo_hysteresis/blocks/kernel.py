@@ -26,6 +26,7 @@ import os
 import warnings
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from functools import cache
 from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -65,13 +66,29 @@ except ImportError:
 else:
 
     def kernel(function: F) -> F:
-        """Compile the loop to machine code at first use and keep it on disk."""
-        return _renewed_with_callees(numba.njit(cache=True, error_model="numpy", nogil=True)(function))
+        """Compile the loop to machine code at first use and keep it on disk, if a folder for it can be written."""
+        return _kept(function)
 
     def inlined(function: F) -> F:
         """A kernel of one sample that is inlined into the loops that call it, which avoids the cost of a call."""
-        options = {"cache": True, "error_model": "numpy", "nogil": True, "forceinline": True}
-        return _renewed_with_callees(numba.njit(**options)(function))
+        return _kept(function, forceinline=True)
+
+    def _kept(function: Any, **options: Any) -> Any:
+        options |= {"error_model": "numpy", "nogil": True}
+        try:
+            loop = numba.njit(cache=True, **options)(function)
+        except RuntimeError:  # from numba: no folder for the machine code
+            _warn_of_compiling_again()
+            return numba.njit(**options)(function)
+        return _renewed_with_callees(loop)
+
+    @cache
+    def _warn_of_compiling_again() -> None:
+        warnings.warn(
+            "neither the folder of this package nor a folder for caches can be written: compiled code is not kept, and "
+            "every start takes longer; set NUMBA_CACHE_DIR to a folder that can be written",
+            stacklevel=4,
+        )
 
     def _renewed_with_callees(loop: Any) -> Any:
         """The loop, compiled anew if a file with a kernel that it calls has changed; numba looks at its own file only.
@@ -80,7 +97,9 @@ else:
         """
         called = (loop.py_func.__globals__.get(name) for name in loop.py_func.__code__.co_names)
         own, *others = (
-            member._cache._cache_file for member in (loop, *called) if isinstance(member, type(loop))
+            member._cache._cache_file
+            for member in (loop, *called)
+            if isinstance(member, type(loop)) and hasattr(member._cache, "_cache_file")
         )  # numba has no public way
         own._source_stamp = own._source_stamp, *(other._source_stamp for other in others)
         return loop

@@ -85,3 +85,30 @@ with on_compilation(lambda: print("compiling")):
     command = [sys.executable, str(program)]
     runs = [subprocess.run(command, env=environment, check=True, capture_output=True, text=True) for _ in range(2)]
     assert [run.stdout for run in runs] == ["compiling\n2.0 3.0\n", "2.0 3.0\n"]
+
+
+def test_without_a_folder_for_machine_code_kernels_are_compiled_at_every_start(tmp_path):
+    """Numba refused to load them, which ended every node of a package whose folder and HOME are read-only."""
+    program = tmp_path / "program.py"
+    program.write_text(
+        """
+from numba.core import caching
+
+folders = getattr(caching, "CacheImpl", None) or caching._CacheImpl  # the name in older versions
+folders._locator_classes = []  # none can be written
+from piezo_hysteresis.blocks.kernel import inlined, kernel
+
+@inlined
+def once(x):
+    return x + 1.0
+
+@kernel
+def twice(x):
+    return once(once(x))
+
+print(twice(1.0))
+"""
+    )
+    run = subprocess.run([sys.executable, str(program)], check=True, capture_output=True, text=True)
+    assert run.stdout == "3.0\n"
+    assert run.stderr.count("set NUMBA_CACHE_DIR to a folder that can be written") == 1
