@@ -126,6 +126,14 @@ class Axis:
         """Drive voltage measured at the piezo [V]."""
         return self.client.number(f"VOL? {self.setup.channel}", *self._plausible) / self.setup.amplifier_gain
 
+    def take_over(self, voltage: float) -> float:
+        """Try how the controller draws lines; a generator that plays the table is ended. Returns the voltage [V]."""
+        if self.is_playing():
+            self.client.command(f"WGO {self.setup.generator} 0")
+            voltage = self.voltage()
+        _ = self.waves.draws_lines
+        return voltage
+
     def displacement(self) -> float:
         """Position [m]."""
         return self.client.number(f"POS? {self.setup.axis}", *self._travel) * self.setup.position_unit

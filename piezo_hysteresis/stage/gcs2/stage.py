@@ -95,7 +95,7 @@ class Gcs2Stage:
         self._limiter = Limiter(self._description).restricted(limits, ramp_rate)
         self._waveform = None
         with self._guarded():
-            _ = self._axis.waves.draws_lines
+            self._voltage = self._axis.take_over(self._voltage)
 
     def watch(self, is_interrupted: Callable[[], bool]) -> None:
         """Call `is_interrupted` before every message of upload, arm, start and read; StoppedError once it is true.

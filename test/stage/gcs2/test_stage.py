@@ -114,6 +114,30 @@ def test_a_drive_outside_a_limit_is_not_sent(bench):
     assert b.controller.heard == []
 
 
+def test_a_wave_table_is_not_overwritten_while_a_generator_that_was_left_running_plays_it(bench):
+    """A controller that reads the table while it plays would go to the end of its range in one step."""
+    b = bench(speed=1.0, opened=False)
+    observer = b.observer()
+    for line in ("WAV 1 X LIN 30000 100 0 30000 0 0", "WSL 1 1", "WGC 1 1", "WTR 1 1 0", "WGO 1 1"):
+        observer.command(line)
+    b.stage = Gcs2Stage(b.setup())
+    carry_out, in_play = b.controller.carry_out, []
+
+    def watched(line):
+        if line.startswith(("WAV", "WCL")) and not line.startswith("WAV?"):
+            in_play.append(b.controller._motion.is_playing)
+        return carry_out(line)
+
+    b.controller.carry_out = watched
+    b.stage.restrict(b.stage.description, 1000.0)
+    assert in_play == [False]
+    assert 0.0 < b.stage.voltage < 5.0
+    assert b.stage.voltage == pytest.approx(b.voltage, abs=1e-3), "it stays where it is"
+    b.stage.safe()
+    assert b.voltage == pytest.approx(0.0, abs=1e-6)
+    observer.connection.close()
+
+
 @pytest.mark.parametrize("use", ["arm", "set_voltage"])
 def test_a_voltage_that_another_program_has_set_is_not_stepped_back(bench, use):
     b = bench(max_slew_rate=1e5)
