@@ -20,7 +20,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from subprocess import PIPE
 
 import numpy as np
@@ -184,6 +184,20 @@ def test_a_keeper_acts_also_when_nobody_reads_its_messages_any_more():
         keeper.stdout.close()
         keeper.stdin.close()
         keeper.wait(30.0)
+        assert abs(amplifier.output) <= SAFE_WITHIN
+
+
+def test_a_keeper_acts_also_when_the_reader_of_its_messages_stands_still():
+    """A paused terminal took no more lines; it stopped the driver, and the keeper in its first message, too."""
+    with keeper_of_a_held_voltage() as (keeper, amplifier):
+        full = os.open(f"/proc/{keeper.pid}/fd/2", os.O_WRONLY | os.O_NONBLOCK)
+        for size in (4096, 1):
+            with suppress(BlockingIOError):
+                while True:
+                    os.write(full, b"." * size)
+        os.close(full)
+        keeper.stdin.close()
+        assert keeper.wait(30.0) == 0
         assert abs(amplifier.output) <= SAFE_WITHIN
 
 

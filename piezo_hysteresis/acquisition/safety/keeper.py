@@ -27,6 +27,7 @@ import os
 import select
 import signal
 import sys
+import threading
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -52,6 +53,10 @@ ATTEMPTS = 5
 """Number of attempts to bring the stage to its safe voltage."""
 _BETWEEN_ATTEMPTS = 0.2
 """Time between two attempts [s]."""
+_STDERR = 2
+"""File descriptor of the messages."""
+_LONGEST_REPORT = 0.2
+"""Longest wait until a message has been written [s]; a paused terminal takes none."""
 _UNKNOWN = "the voltage of the stage is unknown; switch the amplifier off by hand: the device may hold its output"
 """End of the report of a keeper that has not made its stage safe."""
 
@@ -130,9 +135,16 @@ def _make_safe(stage: Stage, order: Mapping[str, Any]) -> int:
 
 
 def _report(text: str) -> None:
-    """Write a line to stderr, which is lost if the terminal or the program that reads it has ended, too."""
-    with suppress(OSError):
-        sys.stderr.write(f"keeper: {' '.join(text.split())}\n")
+    """Write a line to stderr. It is lost if its reader has ended or stands still: the stage does not wait for it."""
+    line = f"keeper: {' '.join(text.split())}\n".encode(errors="backslashreplace")
+
+    def write() -> None:
+        with suppress(OSError):
+            os.write(_STDERR, line)
+
+    writer = threading.Thread(target=write, name="report", daemon=True)
+    writer.start()
+    writer.join(_LONGEST_REPORT)
 
 
 if __name__ == "__main__":
