@@ -61,7 +61,7 @@ def test_a_filtered_stage_is_predicted_at_other_rates(name, fitted, judged):
 @pytest.mark.parametrize(("place", "late"), [("filter_drive", 6e-4), ("filter_pole", 2e-3)])
 def test_a_pole_is_found_where_it_is(place, late):
     stage = Nanopositioner(mode=400.0, pole=2e-5, **{place: late})
-    found = identify(played(stage, 1.0, 60.0), memory=True)
+    found = identify(played(stage, 2.0, 60.0), memory=True)
     amplifier = amplifier_of(found.model)
     assert (amplifier is not None) == (place == "filter_drive")
     assert ("amplifier" in {n.kind for n in found.notices}) == (amplifier is not None)

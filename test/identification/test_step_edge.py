@@ -29,8 +29,8 @@ PERIOD = 5e-4
 STAGE = Nanopositioner(mode=400.0, zeta=0.02, pole=2e-4)
 
 
-def played(stage, *frequencies):
-    drives = ((f"sine_{f:g}hz", growing_sine(f, PERIOD)) for f in frequencies)
+def played(stage, *frequencies, **shape):
+    drives = ((f"sine_{f:g}hz", growing_sine(f, PERIOD, **shape)) for f in frequencies)
     return Experiment(tuple(stage.play(u, PERIOD, name) for name, u in drives))
 
 
@@ -49,14 +49,14 @@ def test_a_step_behind_a_largest_current_is_predicted_at_a_rate_left_out(rise):
 
 
 def test_a_step_that_jumps_needs_no_such_limit():
-    found = identify(played(STAGE, 1.0, 60.0), memory=True)
+    found = identify(played(STAGE, 1.0, 60.0, levels=(0.5, 1.0)), memory=True)
     assert "amplifier_slew_limit_held" not in found.model
 
 
 def test_behind_a_largest_current_one_slow_rate_predicts_a_fast_one():
     """Poles and a mode that describe the slow edge hid the slope: the error was 0.6 %."""
     stage = replace(STAGE, slew=3000.0)
-    found = identify(played(stage, 1.0), memory=True)
+    found = identify(played(stage, 1.0, levels=(0.5, 1.0)), memory=True)
     assert found.model["amplifier_slew_limit_held"]["S"] == pytest.approx(stage.slew, rel=0.1)
     free = free_per_record(found.model, offset=True)
     assert errors(found.model, played(stage, 60.0), free).percent < 0.3
