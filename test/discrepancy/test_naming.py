@@ -57,6 +57,15 @@ def hidden(*names, group="effects", **options):
     return Case(group, names, 1, 5e-4, layout=BRIEF, **options)
 
 
+def once(case):
+    """The experiment with one record of every phase, a third of the samples: enough where no gap on unseen ones is told."""
+    phases: dict[str, Record] = {}
+    for record in recorded(case):
+        if not record.is_named("multisine", "trapezoid"):
+            phases.setdefault(record.phase, record)
+    return Experiment(tuple(phases.values()))
+
+
 CREEP = hidden("creep", extra={"creep": ("logarithmic", 0.015)})
 
 
@@ -102,7 +111,7 @@ def test_data_of_an_explicit_step_have_an_answer_on_request_only():
 
 def test_an_effect_outside_the_catalogue_is_unknown():
     case = hidden(group="uncatalogued", extra={"unknown": UNKNOWN["line"], "unknown_name": ("line",)})
-    found = diagnose(case.experiment(), effects=[BY_NAME[n] for n in ("creep", "thermal_drift", "softening")])
+    found = diagnose(once(case), effects=[BY_NAME[n] for n in ("creep", "thermal_drift", "softening")])
     assert found.verdict is Verdict.UNKNOWN
     assert found.effects() == []
     assert "no effect of the catalogue explains" in found.reason
@@ -123,9 +132,10 @@ def test_an_effect_that_only_test_records_show_is_not_ignored():
 
 def test_without_the_true_family_no_other_effect_is_named():
     library = ("thermal_drift", "gain_drift", "extra_delay", "axis_coupling")
-    found = diagnose(recorded(CREEP), effects=[BY_NAME[n] for n in library])
+    found = diagnose(once(CREEP), effects=[BY_NAME[n] for n in library])
     assert found.verdict is Verdict.UNKNOWN
     assert found.names == ()
+    assert diagnose(once(CREEP), effects=[BY_NAME[n] for n in (*library, "creep")]).names == ("creep",)
 
 
 def test_the_answer_has_its_stable_form():
@@ -255,7 +265,8 @@ def test_a_model_that_diverges_on_a_test_record_ends_with_an_answer(identified_f
 
 
 def test_no_effect_is_named_if_its_twin_was_not_a_candidate():
-    found = diagnose(hidden("softening").experiment(), effects=[BY_NAME[n] for n in ("softening", "extra_delay")])
+    stage = Case("poor", ("softening",), 1, 5e-4)
+    found = diagnose(stage.experiment(), effects=[BY_NAME[n] for n in ("softening", "extra_delay")])
     assert found.conclusion is Conclusion.UNEXPLAINED_GAP
     assert "the closest effect is softening" in found.reason and "sensor_nonlinearity" in found.reason
 
