@@ -100,7 +100,7 @@ def test_the_changed_parameter_is_named(model, another_day, changed, key, size):
     [
         ({"drift": 0.4}, "drift"),
         ({"softening": 0.25}, "softening"),
-        ({"mode": 250.0}, "resonance"),
+        pytest.param({"mode": 250.0}, "resonance", marks=pytest.mark.soak),
         ({"mode": 400.0}, "resonance"),
     ],
 )
@@ -108,7 +108,7 @@ def test_a_large_change_is_named_although_its_form_is_not_exact(model, another_d
     assert change_of(model, replace(another_day, **changed)).key == key
 
 
-@pytest.mark.parametrize("factor", [1.2, 0.85])
+@pytest.mark.parametrize("factor", [pytest.param(1.2, marks=pytest.mark.soak), 0.85])
 def test_a_larger_loop_is_told_by_its_height_at_the_same_slope(model, another_day, factor):
     stage = replace(another_day, loop=factor * another_day.loop)
     (slope, height), (old_slope, old_height) = slope_and_loop(stage), slope_and_loop(STAGE)
@@ -224,7 +224,9 @@ def test_diagnose_says_that_nothing_has_changed(model, another_day):
     assert later.conclusion is Conclusion.CHANGED_PARAMETER
 
 
-@pytest.mark.parametrize("changed", [{"gain": 1.012}, {"gain": 0.987}, {"loop": 0.95}], ids=str)
+@pytest.mark.parametrize(
+    "changed", [{"gain": 1.012}, pytest.param({"gain": 0.987}, marks=pytest.mark.soak), {"loop": 0.95}], ids=str
+)
 def test_gain_and_loop_height_of_another_day_are_no_larger_error(model, changed):
     """The sentence about the error counts it apart from its zero, gain and loop height."""
     factors = {name: factor * getattr(STAGE, name) for name, factor in changed.items()}

@@ -246,7 +246,7 @@ def test_stages_that_the_covariance_allows_miss_the_path_by_what_is_expected() -
     assert found.expected.total > 10.0 * 5e-9
 
 
-@pytest.mark.parametrize("kind", ["generalised plays", "Bouc-Wen, n = 1.6"])
+@pytest.mark.parametrize("kind", ["generalised plays", pytest.param("Bouc-Wen, n = 1.6", marks=pytest.mark.soak)])
 def test_a_stage_of_another_form_misses_the_path_by_about_what_is_expected(kind: str) -> None:
     """The uncertainty of the displacement at rest, which the zero of the sensor contains, made it ten times as much."""
     stage, drives = random_stage(KINDS[kind], 0), fitted_drives()

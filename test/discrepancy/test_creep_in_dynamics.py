@@ -62,7 +62,7 @@ def drives(random):
 @pytest.mark.parametrize(
     ("seed", "gamma"),
     [
-        (1, 0.03),  # a drift and relaxations were named
+        pytest.param(1, 0.03, marks=pytest.mark.soak),  # a drift and relaxations were named
         (3, 0.012),  # 0.0029 to 0.0082 was the interval
         pytest.param(2, 0.03, marks=pytest.mark.soak),  # relaxations were named
         pytest.param(1, 0.012, marks=pytest.mark.soak),  # 0.0014 to 0.01195 was the interval

@@ -251,7 +251,7 @@ def test_a_misfit_in_the_baseline_is_not_a_change(drive):
     assert watch.alarms == 0
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.soak)])
 def test_a_recalibrated_model_raises_no_alarm_at_whatever_moment_it_is_used(seed):
     """Its sensitivities begin at another phase of the drive than those of the baseline."""
     u = sine(85.0)
