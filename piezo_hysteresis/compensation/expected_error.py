@@ -22,10 +22,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..identification.identified_range import HIGHEST, LOWEST
+from ..model.chain import ChainState
 from ..model.model import Model
 from ..record import Record
+from .approach import smooth_transition
 
 Array = NDArray[np.float64]
+
+LEG = 0.1
+"""Duration of each of the three legs of an earlier drive [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,3 +98,19 @@ def parameter_error(model: Model, voltage: Array, along: slice) -> float | None:
         rest = slopes[:, :1].copy() if rest is None else rest
         found[part] = known.errors_with(names, slopes - rest)
     return float(np.sqrt(np.mean(found[along] ** 2)))
+
+
+def error_after_drive(model: Model, voltage: Array, along: slice, start: ChainState) -> float:
+    """RMS change of the displacement over a part of a drive [V], apart from its mean, after an earlier drive [m].
+
+    The earlier drive goes from the state `start` to the highest voltage on which the model was identified, to the
+    lowest one, and back. A model without this range is driven over the range of `voltage`.
+    """
+    rest, count = float(start.inputs[0]), max(round(LEG / model.sample_period), 2)
+    high, low = (float(model.provenance.get(key, end(voltage))) for key, end in ((HIGHEST, np.max), (LOWEST, np.min)))
+    legs = ((rest, high), (high, low), (low, rest))
+    earlier = np.concatenate([smooth_transition(begin, end, count) for begin, end in legs] + [np.array([rest])])
+    chain = model.at(model.sample_period)
+    driven = chain.resume(model.run(earlier, start)[1])
+    change = model.run(voltage, driven)[0][along] - model.run(voltage, start)[0][along]
+    return float(np.std(change))

@@ -30,7 +30,7 @@ from ..model.samples import samples
 from ..record import Record
 from .approach import APPROACH, settled_start, smooth_transition
 from .band import Band
-from .expected_error import ExpectedError, free_run_error, parameter_error
+from .expected_error import ExpectedError, error_after_drive, free_run_error, parameter_error
 from .inverse import Inverse
 from .limit_check import reachable
 from .limits import Limits
@@ -72,6 +72,9 @@ class Plan:
         Where the drive leaves what the model was identified on; the error can exceed the expected one there.
     start_is_known : bool
         False if the stage was driven before its voltages were received: the error can then exceed the expected one.
+    after_drive : float
+        RMS change of the displacement along the path, apart from its mean, if the stage was driven over the range of
+        the model before, so that it does not begin in `start` [m].
     """
 
     wanted: Array
@@ -89,6 +92,7 @@ class Plan:
     band: Band
     beyond: tuple[str, ...] = ()
     start_is_known: bool = True
+    after_drive: float = 0.0
 
     @property
     def path_predicted(self) -> Array:
@@ -200,4 +204,5 @@ def plan(
         end,
         band,
         tuple(said.message for said in outside_of(model, Record(voltage, voltage, model.sample_period))),
+        after_drive=error_after_drive(model, voltage, along, state),
     )

@@ -50,6 +50,21 @@ def test_a_path_within_reach_is_planned_to_the_band() -> None:
     assert np.abs(np.diff(found.predicted[: found.begin])).max() < 2e-8, "no jump on the way there"
 
 
+def test_a_plan_states_by_how_much_an_earlier_drive_changes_the_path() -> None:
+    """A stage that was driven since does not begin at rest; the first rise of the plan was wrong without a word."""
+    model, y = stage(), swing(50.0, 2e-6, 6e-6, 3)
+    model = replace(model, provenance={**model.provenance, "voltage_min": "0", "voltage_max": "10"})
+    found = plan(model, y, UNIPOLAR)
+    slow = np.concatenate((np.linspace(0.0, 10.0, 20_000), np.linspace(10.0, 0.0, 20_000), np.zeros(500)))
+    _, driven = model.run(slow, model.rest(0.0))
+    reached, _ = model.run(found.voltage, driven)
+    off = (reached - found.predicted)[found.begin : found.begin + y.size]
+    assert found.after_drive == pytest.approx(np.std(off), rel=1e-3)
+    assert found.after_drive > found.expected.total
+    straight = model.with_effect(BoucWen(A=0.0))
+    assert plan(straight, y, UNIPOLAR).after_drive < 1e-15
+
+
 def test_zero_after_a_loop_on_unipolar_drive_needs_a_negative_voltage() -> None:
     y = swing(50.0, 0.0, 6e-6, 2)
     model = stage()

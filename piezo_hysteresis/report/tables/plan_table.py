@@ -53,13 +53,20 @@ def plan_table(found: Plan) -> Table:
 
 
 def notes(found: Plan) -> list[str]:
-    """Notes on the plan: where it leaves what the model was identified on, effects left out, and unreachable parts."""
+    """Notes on the plan: its start, where it leaves what the model was identified on, and what it cannot reach."""
     lines = [
         f"caution: {name} has no inverse and was left out; the error above includes the effect of this"
         for name in found.left_out
     ]
     lines += [f"note: {name} does not depend on the drive and is not compensated" for name in found.not_on_path]
     beyond = [f"caution: {said}; the error may be larger there" for said in found.beyond]
+    if found.after_drive > found.expected.total:
+        beyond.insert(
+            0,
+            "caution: the stage begins in the state at rest of the model; if it was driven over its range before, the "
+            f"displacement along the path differs by {nanometre(found.after_drive)} rms and by a constant. Identify "
+            "the model and play the path after the same conditioning",
+        )
     return [*beyond, *lines, *(f"caution: {line}" for line in refusal(found))]
 
 
@@ -95,6 +102,7 @@ def answer(found: Plan) -> dict[str, Any]:
         "voltage_max_V": float(found.voltage.max()),
         "largest_slew_V_per_s": found.largest_slew,
         "expected_error": dict(found.expected.as_dict()),
+        "after_drive_m": found.after_drive,
         "beyond_model": list(found.beyond),
         "reachable": found.reachability.is_whole,
         "unreachable": [

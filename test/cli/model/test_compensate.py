@@ -77,6 +77,16 @@ def test_a_path_outside_of_what_the_model_was_identified_on_is_told(piezo, tmp_p
     assert "the model was identified up to" in json.loads((tmp_path / "plan.json").read_text())["beyond_model"][0]
 
 
+def test_what_an_earlier_drive_would_change_is_told(piezo, model, tmp_path):
+    write(tmp_path / "path.csv", 1.0, 3.0)
+    words = ("compensate", model, tmp_path / "path.csv", "-o", tmp_path / "command.npz", "--json", tmp_path / "p.json")
+    done = piezo(*words, "--report", tmp_path / "page.html")
+    answer = json.loads((tmp_path / "p.json").read_text())
+    assert answer["after_drive_m"] > answer["expected_error"]["total_m"]
+    said = f"along the path differs by {nanometre(answer['after_drive_m'])} rms"
+    assert said in done.out.replace("\n", " ") and said in (tmp_path / "page.html").read_text()
+
+
 def test_terminal_page_and_json_contain_the_same_numbers(piezo, model, tmp_path):
     write(tmp_path / "path.csv", 1.0, 3.0)
     words = ("compensate", model, tmp_path / "path.csv", "-o", tmp_path / "command.npz", "--json", tmp_path / "p.json")
