@@ -109,8 +109,7 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
     whole, noise = setup.for_last_fit()
     named = is_explained(selection)
     first = joint(selection.baseline, whole, LAST, TOLERANCE if named else PRECISE)
-    tested = setup.tested
-    falls = diverges = False
+    tested, falls, diverges = setup.tested, False, False
     if named:
         final = _finished(selection, whole)
         with suppress(DivergenceError):  # on a test record, which moves further than those that were fitted

@@ -92,8 +92,11 @@ class Conclusion(StrEnum):
 
 
 def is_explained(selection: Selection) -> bool:
-    """Whether the added effects explain enough of the gap for a name."""
-    return bool(selection.accepted) and selection.explained(selection.score) >= share_for_a_name(selection.score.excess)
+    """Whether the added effects bring the error down to the floor, or explain enough of the gap for a name."""
+    if not selection.accepted:
+        return False
+    before, left = selection.steps[0].before.excess, selection.score.excess
+    return left <= ADEQUATE < before or selection.explained(selection.score) >= share_for_a_name(left)
 
 
 def named_conclusion(selection: Selection, gap: Gap) -> tuple[Conclusion, str]:

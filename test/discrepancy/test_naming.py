@@ -58,7 +58,7 @@ def hidden(*names, group="effects", **options):
 
 
 def once(case):
-    """The experiment with one record of every phase, a third of the samples: enough where no gap on unseen ones is told."""
+    """The experiment with one record of every phase, a third of the samples: enough where no unseen gap is told."""
     phases: dict[str, Record] = {}
     for record in recorded(case):
         if not record.is_named("multisine", "trapezoid"):
