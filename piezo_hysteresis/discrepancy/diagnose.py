@@ -32,7 +32,7 @@ from ..identification.records.comparable import comparable
 from ..identification.records.excitation_check import check_motion, moves
 from ..identification.records.roles import roles_of
 from ..identification.records.sampling import is_faster, resampled
-from ..identification.structure.state_at_rest import begun_as_conditioned, without_hidden_state
+from ..identification.structure.state_at_rest import begun_as_conditioned, without_hidden_start, without_hidden_state
 from ..model.model import Model
 from ..record import Notice, Record
 from .diagnosis import Diagnosis
@@ -107,8 +107,8 @@ def diagnose(
     if other:
         raise ParameterError(f"diagnose: got {other[0]!r} in effects, expected classes of effects such as Creep")
     end = time.monotonic() + time_limit
-    progress = progress or (lambda word, fraction: None)
-    recorded = experiment_of(experiment)
+    recorded, progress = experiment_of(experiment), progress or (lambda word, fraction: None)
+    effects = without_hidden_start(effects, recorded.records)
     if model is not None:
         model = without_hidden_state(model, recorded.records)
     state = DiagnosisState(recorded, model, effects, progress, end, explicit_step, given=recorded)

@@ -21,8 +21,9 @@ import pytest
 
 from benchmarks.naming_experiments import ladder
 from benchmarks.other_forms import KINDS, random_stage
-from piezo_hysteresis.effects import HYSTERESIS, MEMORY
+from piezo_hysteresis.effects import CATALOGUE, HYSTERESIS, MEMORY
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.identification.structure.state_at_rest import without_hidden_start
 from piezo_hysteresis.record import Experiment, Record
 
 PERIOD = 1e-3
@@ -94,3 +95,11 @@ def test_conditioning_shows_what_was_driven_before_it(kind, before, largest):
     found = identify(Experiment((replace(first, phase="conditioning"), *later)), memory=True)
     assert any(n.kind == "state_at_rest" for n in found.notices) == bool(before.any())
     assert max(percent(found.model, measured(kind, before, [conditioning, *OTHERS]))) < largest
+
+
+def test_the_state_at_rest_is_no_candidate_where_every_run_begins_with_conditioning():
+    """It was named instead of a saturation, which changes the peak of the conditioning: h0 = −1, at its bound."""
+    conditioning, triangle = (Record(LOOP, LOOP, PERIOD, phase) for phase in ("conditioning", "triangle"))
+    run = [conditioning, replace(triangle, continues=True)]
+    assert {*CATALOGUE} - {*without_hidden_start(CATALOGUE, run)} == {HYSTERESIS.start_term}
+    assert without_hidden_start(CATALOGUE, [*run, triangle]) == CATALOGUE

@@ -21,12 +21,12 @@ half of it, or an operator that begins at a state of its own, describe the first
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...effects import MEMORY
+from ...effects import HYSTERESIS, MEMORY, Effect
 from ...model.model import Model
 from ...record import CONDITIONING, Notice, Record
 from ..fit.form_uncertainty import ADEQUACY
@@ -116,6 +116,14 @@ def without_hidden_state(model: Model, records: Sequence[Record]) -> Model:
     if term is None or term.name not in model or not _is_hidden(records):
         return model
     return model.without(term.name)
+
+
+def without_hidden_start(effects: Collection[type[Effect]], records: Sequence[Record]) -> Collection[type[Effect]]:
+    """The effects without the state of an operator at rest, if every run of records begins with a conditioning phase.
+
+    No fitted record shows this state then. It could only imitate what the model misses in the conditioning.
+    """
+    return [e for e in effects if e is not HYSTERESIS.start_term] if _is_hidden(records) else effects
 
 
 def _is_hidden(records: Sequence[Record]) -> bool:
