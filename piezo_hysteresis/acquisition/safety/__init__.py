@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Safety functions of the driver: the latch of a stop, and the keeper process with its link."""
+"""Safety functions of the driver: the latch of a stop, the keeper process with its link, and the console."""

@@ -107,6 +107,7 @@ class KeeperLink:
             [sys.executable, "-m", "piezo_hysteresis.acquisition.safety.keeper"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            stderr=_terminal(),
             pass_fds=locks,
             start_new_session=True,  # a signal to the driver's process group must not end its keeper
         )
@@ -231,3 +232,11 @@ class KeeperLink:
             os.write(self._pipe, text)
         except OSError:  # the pipe is closed or full: the keeper does not read
             self._is_lost = True
+
+
+def _terminal() -> int | None:
+    """Descriptor to which messages finally go: the keeper outlives threads of this process that forward messages."""
+    try:
+        return sys.stderr.fileno()
+    except (AttributeError, ValueError):  # there is none
+        return None

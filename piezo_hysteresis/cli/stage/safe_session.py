@@ -22,6 +22,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any, Protocol, TypeVar
 
+from ...acquisition.safety.console import Console
 from ...acquisition.session import DriverSession
 from ...acquisition.settings import DriverSettings
 
@@ -57,14 +58,14 @@ def closed_safely(opening: Callable[[], _Opened]) -> Iterator[_Opened]:
     """Open a stage for the block, and close it at the end, whatever signals arrive.
 
     The first of `_SIGNALS` raises KeyboardInterrupt in the block. After it, and while the stage closes, all of them
-    are ignored, because they would interrupt the ramp to the safe voltage.
+    are ignored, because they would interrupt the ramp to the safe voltage. A paused terminal delays neither.
 
     Parameters
     ----------
     opening : callable
         Opens the stage, or a session on it.
     """
-    with _handlers_kept() as before:
+    with _handlers_kept() as before, Console():
         for number, handler in before.items():
             if handler is not signal.SIG_IGN:
                 signal.signal(number, _interrupt)

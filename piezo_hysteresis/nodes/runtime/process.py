@@ -32,6 +32,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from ...acquisition.safety.console import Console
 from ...errors import PiezoError
 from .executor import make_executor, spin_until
 from .guarded_node import GuardedNode
@@ -84,6 +85,7 @@ def run_together(lives: Sequence[NodeLife[Any]], arguments: Sequence[str] | None
 
     The handlers of rclpy would invalidate the context at once. Here the signals only end the spinning, further signals
     are ignored, and `end` can still publish and serve. An exception of a callback is reported, and the node continues.
+    No line that the process writes waits for its terminal.
 
     Parameters
     ----------
@@ -98,6 +100,11 @@ def run_together(lives: Sequence[NodeLife[Any]], arguments: Sequence[str] | None
         0, 2 where a node could not be made from its parameters (the reason is one line on stderr), or 130 where it
         was interrupted while it was made.
     """
+    with Console():
+        return _run(lives, arguments)
+
+
+def _run(lives: Sequence[NodeLife[Any]], arguments: Sequence[str] | None) -> int:
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         nodes = [(life.make(), life) for life in lives]
