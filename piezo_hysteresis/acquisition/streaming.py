@@ -156,6 +156,7 @@ class StreamingAcquisition:
             before: it has then made the stage safe or reported that it could not.
         """
         if not self.is_running:
+            self._halting.set()  # it may be about to begin, if an interrupt came while it was started
             return True
         if not self._halting.is_set():
             self._safe.clear()
@@ -176,6 +177,8 @@ class StreamingAcquisition:
         return self._thread.is_alive()
 
     def _run(self) -> None:
+        if self._halting.is_set():
+            return
         try:
             while not self._ready():
                 if self._ending.wait(0.01):

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from .approach import smooth_transition
 Array = NDArray[np.float64]
 
 LEG = 0.1
-"""Duration of each of the three legs of an earlier drive [s]."""
+"""Duration of each of the three legs of an earlier drive [s], or two samples if they are longer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +111,6 @@ def error_after_drive(model: Model, voltage: Array, along: slice, start: ChainSt
     legs = ((rest, high), (high, low), (low, rest))
     earlier = np.concatenate([smooth_transition(begin, end, count) for begin, end in legs] + [np.array([rest])])
     chain = model.at(model.sample_period)
-    driven = chain.resume(model.run(earlier, start)[1])
+    driven = chain.resume(replace(model.run(earlier, start)[1], time=start.time))  # a drift would be another one later
     change = model.run(voltage, driven)[0][along] - model.run(voltage, start)[0][along]
     return float(np.std(change))

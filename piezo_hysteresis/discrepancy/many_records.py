@@ -62,14 +62,14 @@ DIVERGES = (
 def diagnose_many(state: DiagnosisState) -> Diagnosis:
     """Fit the baseline, add the missing effects, and conclude.
 
-    If the error of an explicit step describes the data better than the effects that were found, it is subtracted if the
+    If the error of an explicit step describes the data about as well as the effects found, it is subtracted if the
     user asked for it; otherwise the data have no verdict. A loop that depends on speed leaves a similar error, so the
     two are compared with everything that is found beside them. The search is repeated if time is left and the model
     that was found corrects averaged samples differently.
     """
     setup, selection = _searched(state)
     models = [setup.baseline.model] if setup.score.excess > ADEQUATE else []
-    models += [s.best.fit.model for s in selection.accepted if s.best.score.excess > ADEQUATE]
+    models += [s.best.fit.model for s in selection.accepted if selection.in_time and s.best.score.excess > ADEQUATE]
     for explicit in filter(None, (explicit_model(model, setup.training_data) for model in models)):
         freed = replace(state, experiment=without_steps(state.experiment, explicit))
         found = _searched(freed)

@@ -27,6 +27,7 @@ import numpy as np
 import pytest
 
 from benchmarks.wire import PERIOD, RAMP, SAFE_WITHIN, SLEW, TOP, check_wire, device, driver_process, settings
+from piezo_hysteresis.acquisition.safety import keeper_link
 from piezo_hysteresis.acquisition.session import DriverSession
 from piezo_hysteresis.stage.back_ends import BACK_ENDS
 from piezo_hysteresis.stage.opening import Opening
@@ -199,6 +200,12 @@ def test_a_keeper_acts_also_when_the_reader_of_its_messages_stands_still():
         keeper.stdin.close()
         assert keeper.wait(30.0) == 0
         assert abs(amplifier.output) <= SAFE_WITHIN
+
+
+def test_a_keeper_of_a_driver_without_stderr_writes_its_messages_nowhere(monkeypatch):
+    """Without the descriptor 2, the connection to the device would get this number, and the messages."""
+    monkeypatch.setattr(sys, "stderr", None)
+    assert keeper_link._terminal() == subprocess.DEVNULL
 
 
 def test_a_keeper_never_assumes_where_a_stage_stands():

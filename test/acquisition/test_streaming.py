@@ -63,10 +63,15 @@ class Listener:
         return [e.phase.name for d in self.deliveries for e in d.events if e.kind is kind]
 
 
-def started(stage, kind=StreamingAcquisition, rate=10.0, clock=time.time_ns, **named):
+def made(stage, kind=StreamingAcquisition, rate=10.0, clock=time.time_ns, **named):
     listener = Listener()
     playback = Playback(stage.voltage, 0.0, PERIOD, RAMP_RATE)
     acquisition = kind(stage, playback, TimeBase(PERIOD, rate), 100, clock, listener.deliver, listener.fail, **named)
+    return acquisition, listener
+
+
+def started(stage, kind=StreamingAcquisition, **named):
+    acquisition, listener = made(stage, kind, **named)
     acquisition.start()
     listener.wait(lambda heard: heard.deliveries or heard.failures)
     return acquisition, listener
@@ -142,6 +147,16 @@ def test_a_library_that_ends_the_thread_does_not_leave_the_stage_energised(end):
     listener.wait(lambda heard: heard.failures)
     assert "library of the device" in str(listener.failures[0])
     assert (stage.made_safe, stage.voltage) == (1, 0.0)
+
+
+def test_a_thread_that_begins_after_its_stage_was_given_up_leaves_it_alone():
+    """An interrupt while a thread is started: the stage was closed under it."""
+    stage = Witness(PERIOD, RAMP_RATE)
+    acquisition, listener = made(stage)
+    assert acquisition.make_safe(1.0)
+    acquisition.start()
+    acquisition.make_safe(30.0)
+    assert (stage.made_safe, listener.deliveries, listener.failures) == (0, [], [])
 
 
 def test_a_stall_is_caught_up_with_by_count():

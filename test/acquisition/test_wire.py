@@ -311,6 +311,17 @@ def test_a_controller_that_another_program_stops_on_the_way_to_safety_makes_no_s
         s.end()
 
 
+def test_a_steep_way_to_safety_whose_last_step_is_small_ends_at_the_safe_voltage():
+    """The controller draws the line up to a full step before its end; this was taken for a stop by another program."""
+    steep = 5000.0
+    with device("gcs2") as (name, parameters, amplifier, (controller, _)):
+        s = WiredSession(name, parameters, amplifier, ramp_rate=steep, max_slew_rate=steep)
+        leave_at("gcs2", controller, 10.02 * steep * PERIOD)
+        s.session.stage.safe()
+        assert abs(s.output) <= SAFE_WITHIN
+        s.end()
+
+
 def test_a_card_that_shows_nothing_about_its_output_is_refused_unless_allowed():
     with device("nidaqmx", reads_back=False) as (name, parameters, amplifier, _):
         blind = parameters | {"voltage_input": ""}

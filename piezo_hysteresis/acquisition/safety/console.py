@@ -53,7 +53,8 @@ class Console:
     Threads forward the text. If the terminal takes none for long, lines are lost, and a line says how many. At the end,
     the text that is left has a limited time; the descriptors are then those of the terminal again. Files are left as
     they are: nobody waits for them, and they then contain the last words of a process that crashes. The `fileno` of
-    `sys.stderr` is that of the terminal, for processes that outlive this one.
+    `sys.stderr` is that of the terminal, for processes that outlive this one; descriptors 1 and 2 of a child are the
+    pipes, which nobody reads after the end.
     """
 
     def __enter__(self) -> Self:
@@ -216,10 +217,11 @@ def _writes_to(stream: object, number: int) -> bool:
 
 
 def _keep_colours() -> None:
-    """Let the log of ROS 2 have colours in a terminal, although it writes to a pipe."""
+    """Let the log of ROS 2 have colours and show every line at once in a terminal, although it writes to a pipe."""
     number = 1 if os.environ.get("RCUTILS_LOGGING_USE_STDOUT") == "1" else 2
     if os.isatty(number):
         os.environ.setdefault("RCUTILS_COLORIZED_OUTPUT", "1")
+        os.environ.setdefault("RCUTILS_LOGGING_BUFFERED_STREAM", "1")  # by lines
 
 
 def _write(descriptor: int, text: bytes) -> None:

@@ -129,6 +129,8 @@ class KeeperLink:
             self._ended.set()
             self._process.kill()
             self._process.wait()
+            if self._beats.is_alive():
+                self._beats.join()
             self._close_pipes()
             raise
 
@@ -236,7 +238,9 @@ class KeeperLink:
 
 def _terminal() -> int | None:
     """Descriptor to which messages finally go: the keeper outlives threads of this process that forward messages."""
+    if sys.stderr is None:  # the next file that the keeper opened would get the number 2, and its messages
+        return subprocess.DEVNULL
     try:
         return sys.stderr.fileno()
-    except (AttributeError, ValueError):  # there is none
+    except ValueError:  # a stream in memory
         return None

@@ -14,7 +14,7 @@
 
 """The loop of `BoucWen` with all its terms, integrated by the explicit step of Eq. (7) as some simulations do.
 
-It is not in the catalogue, because no stage takes such steps. `discrepancy/explicit_step.py` subtracts its
+It is not in the catalogue, because no stage takes such steps. `identification/training/explicit_step.py` subtracts its
 error from data of a simulation.
 """
 

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every joint fit of a search works on: records with floors, free parameters, fit and score."""
+"""Training data of a search: records with floors, the parameters that are fitted to them, the fit and its score."""

@@ -64,8 +64,8 @@ def notes(found: Plan) -> list[str]:
         beyond.insert(
             0,
             "caution: the stage begins in the state at rest of the model; if it was driven over its range before, the "
-            f"displacement along the path differs by {nanometre(found.after_drive)} rms and by a constant. Identify "
-            "the model and play the path after the same conditioning",
+            f"displacement along the path differs by {nanometre(found.after_drive)} rms, apart from a constant. "
+            "Identify the model and play the path after the same conditioning",
         )
     return [*beyond, *lines, *(f"caution: {line}" for line in refusal(found))]
 

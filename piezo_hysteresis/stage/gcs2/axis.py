@@ -175,8 +175,8 @@ class Axis:
             if time.monotonic() > due:
                 raise Gcs2Error(f"{self.client.connection.place}: still plays {s.timeout:g} s after the end of a ramp")
             time.sleep(_POLL)
-        # another program may have stopped it on the way; a line that the controller draws ends one step before its end
-        self.require_voltage(float(line[-1]), margin=abs(float(line[-1] - line[-2])))
+        # another program may have stopped it on the way; a line that the controller draws ends a full step early
+        self.require_voltage(float(line[-1]), margin=abs(float(line[1] - line[0])))
         self.set_voltage(float(line[-1]))
 
     def require_voltage(self, drive: float, margin: float = 0.0) -> None:
