@@ -100,9 +100,10 @@ def parameter_error(model: Model, voltage: Array, along: slice) -> float | None:
     return float(np.sqrt(np.mean(found[along] ** 2)))
 
 
-def error_after_drive(model: Model, voltage: Array, along: slice, start: ChainState) -> float:
+def error_after_drive(model: Model, voltage: Array, predicted: Array, along: slice, start: ChainState) -> float:
     """RMS change of the displacement over a part of a drive [V], apart from its mean, after an earlier drive [m].
 
+    `predicted` is the displacement for the drive from the state `start` [m].
     The earlier drive goes from the state `start` to the highest voltage on which the model was identified, to the
     lowest one, and back. A model without this range is driven over the range of `voltage`.
     """
@@ -112,5 +113,4 @@ def error_after_drive(model: Model, voltage: Array, along: slice, start: ChainSt
     earlier = np.concatenate([smooth_transition(begin, end, count) for begin, end in legs] + [np.array([rest])])
     chain = model.at(model.sample_period)
     driven = chain.resume(replace(model.run(earlier, start)[1], time=start.time))  # a drift would be another one later
-    change = model.run(voltage, driven)[0][along] - model.run(voltage, start)[0][along]
-    return float(np.std(change))
+    return float(np.std((model.run(voltage, driven)[0] - predicted)[along]))

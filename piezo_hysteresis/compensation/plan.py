@@ -204,5 +204,5 @@ def plan(
         end,
         band,
         tuple(said.message for said in outside_of(model, Record(voltage, voltage, model.sample_period))),
-        after_drive=error_after_drive(model, voltage, along, state),
+        after_drive=error_after_drive(model, voltage, predicted, along, state),
     )

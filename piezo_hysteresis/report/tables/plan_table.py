@@ -54,20 +54,20 @@ def plan_table(found: Plan) -> Table:
 
 def notes(found: Plan) -> list[str]:
     """Notes on the plan: its start, where it leaves what the model was identified on, and what it cannot reach."""
-    lines = [
+    lines = []
+    if found.after_drive > found.expected.total:
+        lines.append(
+            "caution: the stage begins in the state at rest of the model; if it was driven over its range before, the "
+            f"displacement along the path differs by {nanometre(found.after_drive)} rms, apart from a constant. "
+            "Identify the model and play the path after the same conditioning"
+        )
+    lines += [f"caution: {said}; the error may be larger there" for said in found.beyond]
+    lines += [
         f"caution: {name} has no inverse and was left out; the error above includes the effect of this"
         for name in found.left_out
     ]
     lines += [f"note: {name} does not depend on the drive and is not compensated" for name in found.not_on_path]
-    beyond = [f"caution: {said}; the error may be larger there" for said in found.beyond]
-    if found.after_drive > found.expected.total:
-        beyond.insert(
-            0,
-            "caution: the stage begins in the state at rest of the model; if it was driven over its range before, the "
-            f"displacement along the path differs by {nanometre(found.after_drive)} rms, apart from a constant. "
-            "Identify the model and play the path after the same conditioning",
-        )
-    return [*beyond, *lines, *(f"caution: {line}" for line in refusal(found))]
+    return [*lines, *(f"caution: {line}" for line in refusal(found))]
 
 
 def refusal(found: Plan) -> list[str]:
