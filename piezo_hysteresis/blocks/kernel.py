@@ -53,17 +53,20 @@ except ImportError:
             stacklevel=2,
         )
 
+    IS_COMPILED = False
+
     def kernel(function: F) -> F:
         """Return the loop unchanged, as plain Python."""
         return function
 
-    inlined = kernel
+    inlined = summing = kernel
 
     def on_compilation(call: Callable[[], object]) -> AbstractContextManager[object]:
         """Context in which nothing is compiled."""
         return nullcontext()
 
 else:
+    IS_COMPILED = True
 
     def kernel(function: F) -> F:
         """Compile the loop to machine code at first use and keep it on disk, if a folder for it can be written."""
@@ -72,6 +75,10 @@ else:
     def inlined(function: F) -> F:
         """A kernel of one sample that is inlined into the loops that call it, which avoids the cost of a call."""
         return _kept(function, forceinline=True)
+
+    def summing(function: F) -> F:
+        """A kernel whose sums may be taken in any order, so that the processor adds several numbers at once."""
+        return _kept(function, fastmath={"contract", "nsz", "reassoc"})
 
     def _kept(function: Any, **options: Any) -> Any:
         options |= {"error_model": "numpy", "nogil": True}

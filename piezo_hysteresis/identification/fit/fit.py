@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -179,7 +180,7 @@ def fit(
         current = known.grams if known and known.names == free else grams(model, records, free, nuisance)
     except DivergenceError as error:
         raise IdentificationError(f"fit: the start values diverge ({error})") from error
-    iterations, small, converged = 1, 0, False
+    iterations, small, converged, taken = 1, 0, False, True
     total = weighted(current, sizes)
     while iterations < max_iterations and not converged:
         hessian = directions.T @ total[:-1, :-1] @ directions
@@ -192,8 +193,9 @@ def fit(
         while True:
             step = stable_step(model, free, directions, hessian + np.diag(damping * diagonal), slope, room)
             trial = _bounded(free, np.clip(theta + step, lower, upper))
-            better, cost = _try(model, records, free, trial, nuisance, sizes)
-            if better is not None and cost < total[-1, -1]:
+            # most steps are taken, so a first one is linearised at once
+            better, cost, ahead = _try(model, records, free, trial, nuisance, sizes, linearises=taken)
+            if taken := cost < total[-1, -1]:
                 break
             damping = max(10.0 * damping, 1e-7)
             if damping > MAX_DAMPING:
@@ -203,7 +205,7 @@ def fit(
             break
         decrease = 1.0 - cost / total[-1, -1]
         try:
-            current = grams(better, records, free, nuisance)
+            current = ahead or grams(better, records, free, nuisance)
         except DivergenceError:  # at the limit of stability the output is bounded but its derivatives are not
             break
         model, theta = better, trial
@@ -240,12 +242,23 @@ def _bounded(names: Sequence[str], theta: Array) -> Array:
 
 
 def _try(
-    model: Model, records: Sequence[Record], free: Sequence[str], trial: Array, nuisance: Nuisance | None, floors: Array
-) -> tuple[Model | None, float]:
+    model: Model,
+    records: Sequence[Record],
+    free: Sequence[str],
+    trial: Array,
+    nuisance: Nuisance | None,
+    floors: Array,
+    linearises: bool,
+) -> tuple[Model | None, float, list[Gram]]:
+    """The model with the trial values, or None if it diverges, its cost, and its linearisation if that is wanted."""
     try:
         candidate = model.with_values(dict(zip(free, trial.tolist(), strict=True)))
+        if linearises:
+            with suppress(DivergenceError):  # the output may be bounded although its derivatives are not
+                found = grams(candidate, records, free, nuisance)
+                return candidate, float(weighted(found, floors)[-1, -1]), found
         left = residuals(candidate, records, nuisance)
         squares = [e @ e / (e.size * f * f) for e, f in zip(left, floors, strict=True) if np.isfinite(f)]
-        return candidate, float(np.mean(squares))
+        return candidate, float(np.mean(squares)), []
     except (DivergenceError, ParameterError):
-        return None, np.inf
+        return None, np.inf, []

@@ -29,6 +29,7 @@ from ...effects.environment.mains_hum import harmonics
 from ...errors import DivergenceError
 from ...model.model import Model
 from ...record import Record
+from .inner_products import inner_products
 
 Array = NDArray[np.float64]
 
@@ -150,20 +151,17 @@ def grams(
         record = records[index]
         beside = [(record.displacement[part] - y)[None, :], nuisance.rows(record, part)]
         others: Array = np.concatenate([extra[index][:, part], *beside] if extra else beside)
-        order = [names.index(name) for name in wanted]
-        product = np.empty((len(wanted) + len(others),) * 2)
-        own, rest = slice(len(wanted)), slice(len(wanted), None)
-        product[own, own] = (slopes @ slopes.T)[np.ix_(order, order)]
-        product[own, rest] = np.array([slopes @ row for row in others]).T[order]
-        product[rest, own], product[rest, rest] = product[own, rest].T, others @ others.T
-        if not np.abs(product).max() < RUNAWAY:
+        order = np.array([names.index(name) for name in wanted], np.intp)
+        product = inner_products(slopes, order, others)
+        if not product.diagonal().max() < RUNAWAY:
             raise DivergenceError(model.effects[-1].name, part.start, part.start * record.sample_period)
         if index == len(sums):
             sums.append(product)
         else:
             sums[index] += product
     result = []
-    for record, total in zip(records, sums, strict=True):
+    for record, lower in zip(records, sums, strict=True):
+        total = np.tril(lower) + np.tril(lower, -1).T
         inner, cross, free = total[: q + 1, : q + 1], total[q + 1 :, : q + 1], total[q + 1 :, q + 1 :]
         amplitudes: Array = np.linalg.lstsq(free, cross, rcond=None)[0].astype(np.float64) if len(free) else cross
         result.append(Gram(record.size, inner - cross.T @ amplitudes, amplitudes[:, -1].copy()))
