@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..c_form import HISTORY, CForm
-from .block import Array, Section, State
+from .block import Array, Section, State, extended
 from .kernel import fma, kernel
 from .linear import LinearBlock
 
@@ -122,7 +122,10 @@ def arx_row(x, x0, y0, taps, offset, a, z, y):
 
 @kernel
 def arx_filter(x, x0, y0, taps, offset, a, z, y):
-    """`arx_row` for rows of x (r, n), rest values x0 (r,) and y0 (r,), states z (r, inputs + a.size), y (r, n)."""
+    """`arx_row` for rows of x (r, n), rest values x0 (r,) and y0 (r,), states z (r, inputs + a.size), y (r, n).
+
+    x and y may be the same.
+    """
     for r in range(x.shape[0]):
         arx_row(x[r], x0[r], y0[r], taps, offset, a, z[r], y[r])
 
@@ -234,9 +237,9 @@ class ArxBlock(LinearBlock):
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         x0, (dx0, dz, own), m = state[0], tangent, len(dx)
-        rows, dz = np.empty((m + len(self.names), x.size)), dz.copy()
+        rows, dz = extended(dx, len(self.names)), dz.copy()
         y, after = self.run(x, state)
-        arx_filter(dx, dx0, self.gain * dx0, self.taps, self.offset, self.feedback, dz, rows[:m])
+        arx_filter(rows[:m], dx0, self.gain * dx0, self.taps, self.offset, self.feedback, dz, rows[:m])
         own = self._slopes(x - x0, y - self.gain * x0, self.gain_slopes() * x0, own, rows[m:])
         return y, rows, after, (dx0, dz, own)
 

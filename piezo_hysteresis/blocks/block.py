@@ -16,7 +16,8 @@
 
 A block maps samples x to samples y. *Rest* is the state after a long time at the constant input x0. Sensitivities are
 rows: `linearise` takes ∂x/∂θ of all parameters upstream, shape (m, n), and returns these m rows after the block,
-followed by the rows of the block's own parameters `names`.
+followed by the rows of the block's own parameters `names`. It may change the rows that it takes, and if these are the
+first ones of a larger array, it may write its own rows behind them. So a chain can use one array for all its blocks.
 """
 
 from __future__ import annotations
@@ -37,6 +38,32 @@ State = Any
 """State of a block, used by this block only."""
 Section = tuple[Array, Array]
 """Numerator and denominator of a transfer function, in powers of z⁻¹; the denominator begins with 1."""
+
+
+def extended(dx: Array, added: int) -> Array:
+    """Rows dx (m, n) and `added` further ones, not yet filled, behind them: dx itself if its array has room for them.
+
+    >>> room = np.zeros((3, 2))
+    >>> extended(room[:1], 2).base is room, extended(room[:1], 3).base is room
+    (True, False)
+    """
+    m, n = dx.shape
+    room = dx.base
+    if room is not None and room.shape[1:] == (n,) and len(room) >= m + added and _start(room) == _start(dx):
+        return room[: m + added]
+    rows = np.empty((m + added, n))
+    rows[:m] = dx
+    return rows
+
+
+def _start(rows: Array) -> tuple[int, tuple[int, ...]]:
+    return rows.__array_interface__["data"][0], rows.strides
+
+
+def scale(rows: Array, slope: Array) -> None:
+    """Multiply rows (m, n) by a slope (n,) in place; that of an effect that is off is 1."""
+    if (slope != 1.0).any():
+        rows *= slope
 
 
 class Block(ABC):
@@ -92,7 +119,10 @@ class Block(ABC):
 
     @abstractmethod
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        """`run`, and the sensitivities: y (n,), dy (m + p, n), state, tangent state."""
+        """`run`, and the sensitivities: y (n,), dy (m + p, n), state, tangent state.
+
+        dx (m, n), and the rows behind it in its array, belong to the block and may be changed.
+        """
 
     def c_form(self) -> CForm | str:
         """The block as C code, equivalent to `run`; or the reason why there is none, for a message."""
@@ -155,9 +185,9 @@ class MemorylessBlock(Block):
         return None
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        rows = np.empty((len(dx) + len(self.names), x.size))
-        np.multiply(self.slope(x), dx, out=rows[: len(dx)])
-        rows[len(dx) :] = self.by_parameter(x)
+        m, rows = len(dx), extended(dx, len(self.names))
+        scale(rows[:m], self.slope(x))
+        rows[m:] = self.by_parameter(x)
         return self.value(x), rows, None, None
 
 
@@ -194,16 +224,19 @@ class SumBlock(Block):
         return tuple(m.rest_tangent(x0, dx0) for m in self.members)
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        y, mapped = np.zeros_like(x), np.zeros_like(dx)
-        mine, states, tangents = list[Array](), list[State](), list[State]()
+        m, rows = len(dx), extended(dx, len(self.names))
+        y, before, done = np.zeros_like(x), dx.copy(), m
+        states, tangents = list[State](), list[State]()
+        rows[:m] = 0.0
         for member, s, t in zip(self.members, state, tangent, strict=True):
-            part, dpart, s, t = member.linearise(x, dx, s, t)
+            part, dpart, s, t = member.linearise(x, before.copy(), s, t)
             y += part
-            mapped += dpart[: len(dx)]
-            mine.append(dpart[len(dx) :])
+            rows[:m] += dpart[:m]
+            rows[done : done + len(dpart) - m] = dpart[m:]
+            done += len(dpart) - m
             states.append(s)
             tangents.append(t)
-        return y, np.vstack((mapped, *mine)), tuple(states), tuple(tangents)
+        return y, rows, tuple(states), tuple(tangents)
 
     def c_form(self) -> CForm | str:
         parts: dict[str, CForm] = {}

@@ -21,7 +21,7 @@ from abc import abstractmethod
 import numpy as np
 
 from ..c_form import CForm, Number
-from .block import Array, Block, State
+from .block import Array, Block, State, extended
 
 
 class ChannelBlock(Block):
@@ -57,8 +57,9 @@ class ChannelBlock(Block):
         return (x if state is None else x + self.addition(state)), None
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        rows = np.zeros((len(self.names), x.size)) if state is None else self.by_parameter(state)
-        return self.run(x, state)[0], np.vstack((dx, rows)), None, None
+        rows = extended(dx, len(self.names))
+        rows[len(dx) :] = 0.0 if state is None else self.by_parameter(state)
+        return self.run(x, state)[0], rows, None, None
 
     def added_in_c(self, value: str, **numbers: Number) -> CForm:
         """C form from the C expression `value` of f(c)."""

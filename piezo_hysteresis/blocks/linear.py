@@ -20,7 +20,7 @@ from abc import abstractmethod
 
 import numpy as np
 
-from .block import Array, Block, State
+from .block import Array, Block, State, extended
 
 
 class LinearBlock(Block):
@@ -70,17 +70,27 @@ class LinearBlock(Block):
         return np.array(dx0), self.zeros(len(dx0)), self.own_rest()
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        m, rows = len(dx), extended(dx, len(self.names))
+        outputs, state, tangent = self._respond(x, dx, state, tangent, rows[m:])
+        rows[:m] = outputs[1:]
+        return outputs[0], rows, state, tangent
+
+    def _respond(
+        self, x: Array, dx: Array, state: State, tangent: State, own_rows: Array
+    ) -> tuple[Array, State, State]:
+        """K·x0 + filter(x − x0) of x and of the rows dx, (1 + m, n), and the states; `own_rows` (p, n) are filled."""
         x0, z = state
         dx0, dz, own = tangent
         both = np.vstack((x - x0, dx - dx0[:, None] if dx0.any() else dx))
-        outputs = np.empty((len(both) + len(self.names), x.size))
-        y, rows = outputs[0], outputs[1:]
-        z_next = self.filter(both, np.vstack((z, dz)), outputs[: len(both)])
-        own = self.by_parameter(both[0], y, z[0], own, rows[len(dx) :])
-        settled = np.concatenate((self.gain * dx0, self.gain_slopes() * x0))
+        outputs = np.empty_like(both)
+        z_next = self.filter(both, np.vstack((z, dz)), outputs)
+        own = self.by_parameter(both[0], outputs[0], z[0], own, own_rows)
+        settled, own_settled = self.gain * np.append(x0, dx0), self.gain_slopes() * x0
         if settled.any():  # not where the drive began at 0 V, as most do
-            rows += settled[:, None]
-        return self.gain * x0 + y, rows, (x0, z_next[:1]), (dx0, z_next[1:], own)
+            outputs += settled[:, None]
+        if own_settled.any():
+            own_rows += own_settled[:, None]
+        return outputs, (x0, z_next[:1]), (dx0, z_next[1:], own)
 
 
 class AddedBlock(LinearBlock):
@@ -109,16 +119,16 @@ class AddedBlock(LinearBlock):
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         if self.is_idle:
             return self._linearise_idle(x, dx, state, tangent)
-        added, rows, state, tangent = super().linearise(x, dx, state, tangent)
-        rows[: len(dx)] += dx
-        return x + added, rows, state, tangent
+        m, rows = len(dx), extended(dx, len(self.names))
+        added, state, tangent = self._respond(x, dx, state, tangent, rows[m:])
+        rows[:m] += added[1:]
+        return x + added[0], rows, state, tangent
 
     def _linearise_idle(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         x0, z = state
         dx0, dz, own = tangent
-        m, y, rows = len(dx), np.empty((1, x.size)), np.empty((len(dx) + len(self.names), x.size))
+        m, y, rows = len(dx), np.empty((1, x.size)), extended(dx, len(self.names))
         z_next = self.filter((x - x0)[None, :], z, y)
         own = self.by_parameter(x - x0, y[0], z[0], own, rows[m:])
-        rows[:m] = dx
         rows[m:] += (self.gain_slopes() * x0)[:, None]
         return x, rows, (x0, z_next), (dx0, dz, own)

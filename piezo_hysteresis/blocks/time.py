@@ -21,7 +21,7 @@ from abc import abstractmethod
 import numpy as np
 
 from ..c_form import CForm, Number
-from .block import Array, Block, State
+from .block import Array, Block, State, extended, scale
 from .inverses.inverted_block import InvertedBlock
 
 
@@ -81,7 +81,10 @@ class TimeBlock(Block):
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         t, state = self._times(x.size, state)
-        return self.value(x, t), np.vstack((self.slope(x, t) * dx, self.by_parameter(x, t))), state, None
+        m, rows = len(dx), extended(dx, len(self.names))
+        scale(rows[:m], self.slope(x, t))
+        rows[m:] = self.by_parameter(x, t)
+        return self.value(x, t), rows, state, None
 
     def inverted(self, name: str) -> InvertedBlock | None:
         return InvertedAddition(self)

@@ -240,7 +240,8 @@ class Chain:
             y, state = self.run(u, state, channels)
             return y, (), np.empty((0, u.size)), state, tangent
         states, tangents, inputs, dinputs = [], [], [], []
-        x, dx, rows = u, np.empty((0, u.size)), []
+        room = np.empty((sum(len(block.names) for block in self.blocks), u.size))
+        x, dx, rows = u, room[:0], []
         for block, s, t in zip(self.blocks, state.blocks, tangent.blocks, strict=True):
             inputs.append(float(x[-1]))
             dinputs.append(dx[:, -1].copy())
@@ -248,13 +249,14 @@ class Chain:
                 s = (channels or {}).get(block.channel)
             before = len(dx)
             x, dx, s, t = block.linearise(x, dx, s, t)
-            if block.names:
-                kept = [k for k, n in enumerate(block.names) if n in wanted]
-                for j, k in enumerate(kept):
-                    if j < k:
-                        dx[before + j] = dx[before + k]
-                dx = dx[: before + len(kept)]
-                rows += [block.names[k] for k in kept]
+            if dx.base is not room:
+                room[: len(dx)] = dx
+            kept = [k for k, n in enumerate(block.names) if n in wanted]
+            for j, k in enumerate(kept):
+                if j < k:
+                    room[before + j] = room[before + k]
+            dx = room[: before + len(kept)]
+            rows += [block.names[k] for k in kept]
             states.append(s)
             tangents.append(t)
         time = state.time + u.size * self.setting.sample_period

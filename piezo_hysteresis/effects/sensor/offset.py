@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...blocks.block import Array, Block, State
+from ...blocks.block import Array, Block, State, extended
 from ...blocks.inverses.inverted_block import InvertedBlock
 from ...c_form import CForm
 from ...parameter import Parameter
@@ -93,8 +93,9 @@ class OffsetBlock(Block):
         return np.array(dx0)
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
-        rows = np.empty((len(dx) + 2, x.size))
-        np.add(dx, (self.settling * tangent)[:, None], out=rows[:-2])
+        rows, settled = extended(dx, 2), self.settling * tangent
+        if settled.any():
+            rows[:-2] += settled[:, None]
         rows[-2] = 1.0
         rows[-1] = state
         return self.run(x, state)[0], rows, state, tangent
