@@ -59,6 +59,10 @@ class FirBlock(AddedBlock):
         """The direct path and the taps, one section without poles."""
         return ((self.added + np.eye(1, self.added.size)[0], np.ones(1)),)
 
+    @property
+    def is_idle(self) -> bool:
+        return not self.added.any()
+
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, self.added.size - 1))
 

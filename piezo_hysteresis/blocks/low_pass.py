@@ -143,6 +143,10 @@ class LowPassBlock(AddedBlock):
         left, lead, back = self.step
         return ((np.array([lead, back]), np.array([1.0, -left])),) * self.count
 
+    @property
+    def is_idle(self) -> bool:
+        return self.step == (0.0, 1.0, 0.0)
+
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, 1 + self.count))
 
@@ -151,6 +155,12 @@ class LowPassBlock(AddedBlock):
         run_poles(x, *self.step, z, y)
         y -= x
         return z
+
+    def _linearise_idle(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        x, rows, state, (dx0, _, own) = super()._linearise_idle(x, dx, state, tangent)
+        last = rows[: len(dx), -1] - dx0
+        # a short time constant makes no difference at a long sample period, but may do so at the one that follows
+        return x, rows, state, (dx0, np.repeat(last[:, None], 1 + self.count, axis=1), own)
 
     def c_form(self) -> CForm:
         left, lead, back = self.step
