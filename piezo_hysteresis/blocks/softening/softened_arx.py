@@ -26,7 +26,7 @@ import numpy as np
 
 from ...c_form import CForm
 from ..arx import ArxBlock
-from ..block import Array, Block, MemorylessBlock, State
+from ..block import Array, Block, MemorylessBlock, State, extended
 from ..group_delay import GroupDelayBlock
 from ..inverses.inverted_block import InvertedBlock
 from ..inverses.linear_inverse import LinearInverse
@@ -95,12 +95,16 @@ def add_mixed(weights, rows, out):
 
 
 class SoftenedArxBlock(Block):
-    """State: state of the ARX; w and x at rest; states of mode and ξ; state of the path."""
+    """State: state of the ARX; w and x at rest; states of mode and ξ; state of the path.
+
+    If the softening is off, ξ has no incoming sensitivities: those of the ARX are left, and those by k2 and k3.
+    """
 
     def __init__(self, arx: ArxBlock, settled: StaticSoftening, path: Path) -> None:
         self.arx, self.settled, self.path = arx, settled, path
         self.loop = np.append(path.mode, (settled.k2, settled.k3))
         self.names = (*settled.names, *arx.names)
+        self.is_off = settled.k2 == settled.k3 == 0.0
 
     def static(self, x0: float) -> float:
         return self.arx.gain * x0 + self.path.share * (self.settled.static(x0) - x0)
@@ -136,35 +140,42 @@ class SoftenedArxBlock(Block):
 
     def rest_tangent(self, x0: float, dx0: Array) -> State:
         slope, own = self.settled.static_slopes(x0)
-        settled = np.concatenate((slope * dx0, np.zeros(2), own))
+        dw0 = np.array(dx0[:0] if self.is_off else dx0)
+        settled = np.concatenate((slope * dw0, np.zeros(2), own))
         moved = np.zeros((len(settled), 4))
         filtered = self.path.filter.zeros(len(settled))
-        return self.arx.rest_tangent(x0, dx0), np.array(dx0), settled, moved, filtered, self.path.filter.own_rest()
+        return self.arx.rest_tangent(x0, dx0), dw0, settled, moved, filtered, self.path.filter.own_rest()
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         arx, (w0, x0), z, filtered = state
         d_arx, dw0, dx0, dz, d_filtered, own = tangent
-        m, na, nb, k = len(dx), self.arx.a.size, self.arx.b.size, len(self.path.by_a)
-        dz, xi = dz.copy(), np.empty(x.shape)
-        d_xi = np.empty((m + 4, x.size))
-        z = z.copy()
-        linearise_mode_deviation(x - w0, dx - dw0[:, None], x0, dx0, self.loop, z, dz, xi, d_xi)
+        m, moved, path = len(dx), len(dw0), self.path
+        d_xi, dz, xi, z = np.empty((moved + 4, x.size)), dz.copy(), np.empty(x.shape), z.copy()
+        linearise_mode_deviation(x - w0, dx[:moved] - dw0[:, None], x0, dx0, self.loop, z, dz, xi, d_xi)
         y, rows, arx, d_arx = self.arx.linearise(x, dx, arx, d_arx)
-        added, through, by_path = np.empty((1, x.size)), np.empty(d_xi.shape), np.empty((k + 1, x.size))
-        after = self.path.filter.filter(xi[None, :], filtered, added)
-        own = self.path.filter.by_parameter(xi, added[0], filtered[0], own, by_path)
-        d_filtered = self.path.filter.filter(d_xi, d_filtered, through)
-        rows[:m] += self.path.share * (dx0[:m] - dw0)[:, None] + through[:m]
-        rows[m:] += (self.path.share_slopes * (x0 - w0))[:, None]
-        by_mode = through[m : m + 2] - added / self.path.gain
-        add_mixed(self.path.mode_by_a, by_mode, rows[m : m + na])
-        add_mixed(self.path.by_a, by_path[:k], rows[m : m + na])
-        add_mixed(self.path.by_b, by_path[:k], rows[m + na : m + na + nb])
-        rows[m + na + nb] += by_path[k]
-        by_stiffness = self.path.share * dx0[m + 2 :, None] + through[m + 2 :]
-        y = y + (self.path.share * (x0 - w0) + added[0])
-        tangent = (d_arx, dw0, dx0, dz, d_filtered, own)
-        return y, np.vstack((rows[:m], by_stiffness, rows[m:])), (arx, (w0, x0), z, after), tangent
+        through = np.empty(d_xi.shape)
+        d_filtered = path.filter.filter(d_xi, d_filtered, through)
+        through += path.share * (dx0 - np.pad(dw0, (0, 4)))[:, None]
+        if not self.is_off:
+            rows[:m] += through[:m]
+            added, by_path = np.empty((1, x.size)), np.empty((len(path.by_a) + 1, x.size))
+            after = path.filter.filter(xi[None, :], filtered, added)
+            own = path.filter.by_parameter(xi, added[0], filtered[0], own, by_path)
+            self._add_by_arx(added, through[m : m + 2], by_path, rows[m:])
+            rows[m:] += (path.share_slopes * (x0 - w0))[:, None]
+            y, filtered = y + (path.share * (x0 - w0) + added[0]), after
+        rows = extended(rows, 2)
+        rows[m + 2 :] = rows[m:-2]
+        rows[m : m + 2] = through[moved + 2 :]
+        return y, rows, (arx, (w0, x0), z, filtered), (d_arx, dw0, dx0, dz, d_filtered, own)
+
+    def _add_by_arx(self, added: Array, by_mode: Array, by_path: Array, rows: Array) -> None:
+        """Add the derivatives of R ξ (1, n), by mode (2, n) and path (k + 1, n), to the rows of the ARX (p, n)."""
+        na, nb = self.arx.a.size, self.arx.b.size
+        add_mixed(self.path.mode_by_a, by_mode - added / self.path.gain, rows[:na])
+        add_mixed(self.path.by_a, by_path[:-1], rows[:na])
+        add_mixed(self.path.by_b, by_path[:-1], rows[na : na + nb])
+        rows[na + nb] += by_path[-1]
 
 
 class SlowSoftenedBlock(SeriesBlock):
