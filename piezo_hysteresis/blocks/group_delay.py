@@ -19,7 +19,34 @@ from __future__ import annotations
 import numpy as np
 
 from .block import Array, State
+from .kernel import kernel
 from .linear import LinearBlock
+
+
+@kernel
+def delay_rows(x, gain, part, z, y):
+    """Rows of x (r, n), delayed by whole + part samples, times gain, to y (r, n); z (r, whole + 1) are inputs, updated.
+
+    The oldest input of z is the first.
+    """
+    before, n = z.shape[1], x.shape[1]
+    for r in range(x.shape[0]):
+        for i in range(min(before, n)):
+            near = z[r, i + 1] if i + 1 < before else x[r, 0]
+            y[r, i] = gain * ((1.0 - part) * near + part * z[r, i])
+        past, late = x[r], y[r, before:]
+        for i in range(n - before):
+            late[i] = gain * ((1.0 - part) * past[i + 1] + part * past[i])
+        for k in range(before):
+            z[r, k] = z[r, n + k] if n + k < before else x[r, n + k - before]
+
+
+@kernel
+def mix_two(first, second, x, y, rows):
+    """rows (p, n) = first (p,) · x (n,) + second (p,) · y (n,)."""
+    for k in range(rows.shape[0]):
+        for i in range(rows.shape[1]):
+            rows[k, i] = first[k] * x[i] + second[k] * y[i]
 
 
 class GroupDelayBlock(LinearBlock):
@@ -46,13 +73,9 @@ class GroupDelayBlock(LinearBlock):
     def zeros(self, rows: int) -> Array:
         return np.zeros((rows, self.whole + 1))
 
-    def _two_taps(self, x: Array, z: Array) -> tuple[Array, Array, Array]:
-        whole = np.concatenate((z, x), axis=1)
-        return whole[:, 1 : 1 + x.shape[1]], whole[:, : x.shape[1]], whole[:, x.shape[1] :].copy()
-
     def filter(self, x: Array, z: Array, y: Array) -> Array:
-        near, far, z = self._two_taps(x, z)
-        y[:] = self.gain * ((1.0 - self.part) * near + self.part * far)
+        z = z.copy()
+        delay_rows(x, self.gain, self.part, z, y)
         return z
 
     def gain_slopes(self) -> Array:
@@ -62,7 +85,8 @@ class GroupDelayBlock(LinearBlock):
         return None
 
     def by_parameter(self, x: Array, y: Array, z: Array, own: State, rows: Array) -> State:
-        near, far, _ = self._two_taps(x[None, :], z[None, :])
-        by_lag = self.gain * (far[0] - near[0])
-        by_gain = (1.0 - self.part) * near[0] + self.part * far[0]
-        rows[:] = np.outer(self._gain_slopes, by_gain) + np.outer(self._lag_slopes, by_lag)
+        past = np.concatenate((z, x))
+        near, far = past[1 : 1 + x.size], past[: x.size]
+        by_lag = self.gain * (far - near)
+        by_gain = (1.0 - self.part) * near + self.part * far
+        mix_two(self._gain_slopes, self._lag_slopes, by_gain, by_lag, rows)
