@@ -179,7 +179,10 @@ class SoftenedArxBlock(Block):
 
 
 class SlowSoftenedBlock(SeriesBlock):
-    """Static softening of one mode in a sum, followed by the lag of G, for records slower than the model."""
+    """Static softening of one mode in a sum, followed by the lag of G, for records slower than the model.
+
+    The rows of the series are those of the stiffness, the ratio and the ARX; the ratio is a function of the ARX.
+    """
 
     def __init__(self, lag: GroupDelayBlock, arx: ArxBlock, settled: StaticSoftening, path: Path) -> None:
         ratio = path.share / arx.gain
@@ -187,17 +190,16 @@ class SlowSoftenedBlock(SeriesBlock):
         self.ratio_slopes = (path.share_slopes - ratio * arx.gain_slopes()) / arx.gain
         self.names = (*settled.names, *lag.names)
 
-    def _folded(self, own: Array) -> Array:
-        """Rows of the stiffness, the ratio and the ARX; the ratio is a function of the ARX."""
-        return np.concatenate((own[:2], own[3:] + np.multiply.outer(self.ratio_slopes, own[2])))
-
     def static_slopes(self, x0: float) -> tuple[float, Array]:
         slope, own = super().static_slopes(x0)
-        return slope, self._folded(own)
+        return slope, np.concatenate((own[:2], own[3:] + self.ratio_slopes * own[2]))
 
     def linearise(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
         y, rows, state, tangent = super().linearise(x, dx, state, tangent)
-        return y, np.concatenate((rows[: len(dx)], self._folded(rows[len(dx) :]))), state, tangent
+        own = rows[len(dx) :]
+        add_mixed(self.ratio_slopes[None, :], own[2:3], own[3:])
+        own[2:-1] = own[3:]
+        return y, rows[:-1], state, tangent
 
 
 class _Shared(MemorylessBlock):
