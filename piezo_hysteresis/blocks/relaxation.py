@@ -22,7 +22,7 @@ import numpy as np
 
 from ..c_form import CForm, Number
 from ..inverse_terms import InverseStart, InverseTerms, RelaxationTerms
-from .block import Array, State
+from .block import Array, State, extended
 from .kernel import kernel
 from .linear import AddedBlock
 
@@ -63,17 +63,17 @@ def hold(tau: Array, sample_period: float) -> Hold:
 
 @kernel
 def relax(u, fade, lead, weights, z, y):
-    """Rows of u (r, n) to y (r, n) = Σ weights_j x_j; z (r, 1 + s) = last input and x_j, updated; s a multiple of 4.
+    """Rows of u (r, n) to sums y (q, r, n) = Σ_j weights_kj x_j; z (r, 1 + s) = last input and x_j, updated.
 
-    Four relaxations are computed together, because each sample of a single one depends on the sample before.
+    weights (q, s), with s a multiple of 4: so many relaxations are computed together, because each sample of a single
+    one depends on the sample before.
     """
     n = u.shape[1]
+    y[:] = 0.0
     for r in range(u.shape[0]):
-        y[r] = 0.0
         for j in range(0, fade.size, LANES):
             f0, f1, f2, f3 = fade[j], fade[j + 1], fade[j + 2], fade[j + 3]
             l0, l1, l2, l3 = lead[j], lead[j + 1], lead[j + 2], lead[j + 3]
-            w0, w1, w2, w3 = weights[j], weights[j + 1], weights[j + 2], weights[j + 3]
             x0, x1, x2, x3 = z[r, j + 1], z[r, j + 2], z[r, j + 3], z[r, j + 4]
             last = z[r, 0]
             for i in range(n):
@@ -82,15 +82,17 @@ def relax(u, fade, lead, weights, z, y):
                 x1 += f1 * (last - x1) + l1 * du
                 x2 += f2 * (last - x2) + l2 * du
                 x3 += f3 * (last - x3) + l3 * du
-                y[r, i] += (w0 * x0 + w1 * x1) + (w2 * x2 + w3 * x3)
                 last = u[r, i]
+                for k in range(weights.shape[0]):
+                    w = weights[k]
+                    y[k, r, i] += (w[j] * x0 + w[j + 1] * x1) + (w[j + 2] * x2 + w[j + 3] * x3)
             z[r, j + 1], z[r, j + 2], z[r, j + 3], z[r, j + 4] = x0, x1, x2, x3
         z[r, 0] = u[r, n - 1]
 
 
 @kernel
 def relax_side_by_side(u, fade, lead, weights, z, y):
-    """`relax` with the same bits, three times as fast for many rows, because these do not wait for each other.
+    """`relax` to one sum (r, n) with the same bits, but three times as fast for many rows: none waits for the others.
 
     The rows are padded to a multiple of 8, and to 16, because so many are computed at a time.
     """
@@ -180,13 +182,12 @@ class RelaxationBlock(AddedBlock):
         return np.zeros((rows, self.mix.size))
 
     def filter(self, x: Array, z: Array, y: Array) -> Array:
-        return self._mix(x, z, self.mix, y)
-
-    def _mix(self, x: Array, z: Array, mix: Array, y: Array) -> Array:
-        z = z.copy()
-        bank = relax if len(x) < MANY else relax_side_by_side
-        bank(x, self.hold.fade, self.hold.lead, mix[1:].copy(), z, y)
-        y += mix[0] * x
+        z, weights = z.copy(), self.mix[1:].copy()
+        if len(x) < MANY:
+            relax(x, self.hold.fade, self.hold.lead, weights[None, :], z, y[None, :])
+        else:
+            relax_side_by_side(x, self.hold.fade, self.hold.lead, weights, z, y)
+        y += self.mix[0] * x
         return z
 
     def c_form(self) -> CForm:
@@ -216,5 +217,16 @@ class RelaxationBlock(AddedBlock):
         return None
 
     def by_parameter(self, x: Array, y: Array, z: Array, own: None, rows: Array) -> None:
-        for k, mix in enumerate(self.mix_slopes):
-            self._mix(x[None, :], z[None, :], mix, rows[k : k + 1])
+        self._by_mix(x, z[None, :].copy(), rows)
+
+    def _by_mix(self, x: Array, z: Array, rows: Array) -> None:
+        relax(x[None, :], self.hold.fade, self.hold.lead, self.mix_slopes[:, 1:].copy(), z, rows[:, None, :])
+        rows += np.multiply.outer(self.mix_slopes[:, 0], x)
+
+    def _linearise_idle(self, x: Array, dx: Array, state: State, tangent: State) -> tuple[Array, Array, State, State]:
+        x0, z = state[0], state[1].copy()
+        rows = extended(dx, len(self.names))
+        own = rows[len(dx) :]
+        self._by_mix(x - x0, z, own)  # the state is that of the own rows
+        own += (self.gain_slopes() * x0)[:, None]
+        return x, rows, (x0, z), tangent

@@ -30,7 +30,7 @@ def test_rows_side_by_side_have_the_bits_of_single_rows(rows: int, cuts: tuple[i
     bank = hold(np.geomspace(1e-3, 1e2, 3 * LANES), 1e-3)
     weights, rest = rng.normal(size=3 * LANES), rng.normal(size=(rows, 1 + 3 * LANES))
     expected, after = np.empty_like(u), rest.copy()
-    relax(u, bank.fade, bank.lead, weights, after, expected)
+    relax(u, bank.fade, bank.lead, weights[None, :], after, expected[None, :])
     parts, state = [], rest.copy()
     for part in np.split(u, cuts, axis=1):
         parts.append(np.empty_like(part))
