@@ -31,7 +31,7 @@ from ...identification.fit.fit import Fit, Progress
 from ...identification.fit.form_uncertainty import ADEQUACY
 from ...identification.records.conditioning import path_of, with_conditioning
 from ...identification.records.intersample_error import intersample_error
-from ...identification.records.noise_floor import noise_floors, noise_of_averages, stroke
+from ...identification.records.noise_floor import ADEQUATE, noise_floors, noise_of_averages, stroke
 from ...identification.records.sampling import at_period, common_period, less, shortened, slowed
 from ...identification.start_models import exact, modal_models, start_models
 from ...identification.training.joint_fit import FAILURES, LAST, LATER, PRECISE, joint
@@ -141,9 +141,10 @@ def prepare_baseline(
     training_data, score = score_baseline(baseline, training_data)
     if leaves_room(score):
         start_helpers()  # effects will be searched for
+    if score.excess > ADEQUATE:
         for other in starts:
             baseline, score = better_fit(exact(other), baseline, score, training_data)
-    if leaves_room(score):
+    if score.excess > ADEQUATE:
         for modal in modal_models(baseline.model, records, fitted):
             baseline, score = better_fit(modal, baseline, score, training_data, CLEARLY)
     least = _floors(noise, span, lost)

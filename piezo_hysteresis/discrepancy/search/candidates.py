@@ -77,17 +77,21 @@ class FittedCandidate(Candidate):
     fit: Fit
 
 
-def screen(model: Model, training_data: TrainingData, effects: Iterable[type[Effect]]) -> list[Candidate]:
+def screen(
+    model: Model, training_data: TrainingData, effects: Iterable[type[Effect]], is_small: bool = False
+) -> list[Candidate]:
     """Score test of every effect of the catalogue at each of its start values, best first.
 
     Effects that are off at their start share one pass over the data, but for hum, which is free in every record. An
-    effect with a finite start is represented by the change that it makes.
+    effect with a finite start is represented by the change that it makes. Where what remains is small (`is_small`), a
+    term of the loop or of the dynamics that can start from off needs no other start; the dynamics cannot hide it.
     """
     base = adjusted_numbers(model, training_data)
     starts = [
         (effect, starts_of(effect, training_data.extent)) for effect in effects if _fits(model, training_data, effect)
     ]
-    groups: list[list[Effect]] = [[s for _, many in starts for s in many if not s.is_off]]
+    finite = [many for e, many in starts if not (is_small and e.host and any(s.is_off for s in many))]
+    groups: list[list[Effect]] = [[s for many in finite for s in many if not s.is_off]]
     for turn in range(max((len(s) for _, s in starts), default=0)):
         groups.append([s[turn] for e, s in starts if turn < len(s) and s[turn].is_off and e is not MainsHum])
     groups += [[hum] for effect, s in starts if effect is MainsHum for hum in s]

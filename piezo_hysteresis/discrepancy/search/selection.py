@@ -121,9 +121,8 @@ def _turn(
     training_data = training_data.with_peaks(residuals(model, training_data.records, training_data.free_with(model)))
     present = {e.public_name() for e in model.effects}
     twins = {e.name: t.name for e in effects for t in model.effects if e.is_twin_of(t)}
-    screened = screen(
-        model, training_data, [e for e in effects if e.public_name() not in present and e.name not in twins]
-    )
+    tried = [e for e in effects if e.public_name() not in present and e.name not in twins]
+    screened = screen(model, training_data, tried, is_small=before.excess <= ADEQUATE)
     refits, best, reason = _best_effect(model, screened, before, progress)
     if best is None:
         return None

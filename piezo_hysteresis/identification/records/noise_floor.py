@@ -142,6 +142,7 @@ def _sum_of_octaves(density: Array) -> float:
     return float(sum(b.size * np.nanmedian(b) for b in bands if np.isfinite(b).any()) / np.log(2.0))
 
 
+@once_per_record
 def quantum(record: Record) -> float:
     """Resolution of the converter [m]: the smallest difference between readings; 0 if readings do not repeat."""
     levels = np.unique(record.displacement)
