@@ -95,12 +95,9 @@ def screen(
     for turn in range(max((len(s) for _, s in starts), default=0)):
         groups.append([s[turn] for e, s in starts if turn < len(s) and s[turn].is_off and e is not MainsHum])
     groups += [[hum] for effect, s in starts if effect is MainsHum for hum in s]
-    best: dict[str, Candidate] = {}
-    for _, found in on_cores(partial(_screen_group, model, training_data, base), [g for g in groups if g]):
-        for candidate in found:
-            if candidate.name not in best or candidate.score.cost < best[candidate.name].score.cost:
-                best[candidate.name] = candidate
-    return sorted(best.values(), key=BY_COST)
+    passes = on_cores(partial(_screen_group, model, training_data, base), [g for g in groups if g])
+    found = sorted((candidate for _, many in passes for candidate in many), key=BY_COST)
+    return sorted({candidate.name: candidate for candidate in reversed(found)}.values(), key=BY_COST)
 
 
 def starts_of(effect: type[Effect], extent: Extent) -> tuple[Effect, ...]:
@@ -137,16 +134,15 @@ def _screen_group(model: Model, training_data: TrainingData, base: list[str], me
 
 
 def _screen_moves(model: Model, training_data: TrainingData, base: list[str], moves: list[Effect]) -> list[Candidate]:
-    now = model.free_run(training_data.records)
-    usable, rows = [], []
+    now, usable = model.free_run(training_data.records), list[Effect]()
+    changes = [np.empty((len(moves), y.size)) for y in now]
     for effect in moves:
         with suppress(DivergenceError, ParameterError, ModelError):
             then = model.with_effect(effect).free_run(training_data.records)
-            rows.append([a - b for a, b in zip(then, now, strict=True)])
+            for change, a, b in zip(changes, then, now, strict=True):
+                np.subtract(a, b, out=change[len(usable)])
             usable.append(effect)
-    if not usable:
-        return []
-    changes = [np.array(change) for change in zip(*rows, strict=True)]
+    changes = [change[: len(usable)] for change in changes]
     products = grams(model, training_data.records, base, training_data.free_with(model), changes)
     columns = directions(model, base, len(usable))
     found = _scored(model, base, training_data, products, columns, ((e, 1) for e in usable))
