@@ -164,7 +164,7 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
         fit=fit,
         where=where,
         gap=gap,
-        next_experiment=best_next_experiment(selection, setup.training_data),
+        next_experiment=best_next_experiment(selection, setup.training_data) if falls or is_unexplained else None,
         correction=correction,
     )
 

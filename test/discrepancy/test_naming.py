@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 
 from benchmarks.coverage import truth_of
+from benchmarks.diagnosis import simulated
 from benchmarks.naming_cases import UNKNOWN, Case
 from benchmarks.naming_experiments import ProtocolVariant
 from piezo_hysteresis.changes.recalibration import recalibrate
@@ -100,12 +101,12 @@ def test_a_hidden_effect_is_named_and_its_gap_closes_on_unseen_records(case):
 
 
 def test_data_of_an_explicit_step_have_an_answer_on_request_only():
-    simulated = recorded(Case("effect_free", (), 3, 5e-4, "explicit", layout=BRIEF))
+    integrated = recorded(Case("effect_free", (), 3, 5e-4, "explicit", layout=BRIEF))
     library = [BY_NAME[n] for n in ("creep", "mains_hum")]
-    found = diagnose(simulated, effects=library)
+    found = diagnose(integrated, effects=library)
     assert found.conclusion is Conclusion.INSUFFICIENT_DATA
     assert "--explicit-step" in found.reason
-    found = diagnose(simulated, effects=library, explicit_step=True)
+    found = diagnose(integrated, effects=library, explicit_step=True)
     assert found.conclusion is Conclusion.NOTHING_MISSING
 
 
@@ -172,6 +173,15 @@ def test_the_answer_has_its_stable_form():
     assert following is None or (isinstance(following["phase"], str) and len(following["separates"]) == 2)
     assert answer["data_quality"] == []
     assert answer["model"] == "better.yaml"
+
+
+@pytest.mark.soak
+def test_an_answer_that_nothing_is_missing_asks_for_no_experiment():
+    """What a small softening leaves is at the floor, so nobody needs to know if it or a sensor nonlinearity did it."""
+    found = diagnose(simulated(16))
+    assert found.verdict is Verdict.NOTHING_MISSING
+    assert found.selection.accepted[0].confusable_with
+    assert found.next_experiment is None
 
 
 def triangle(records):
