@@ -226,7 +226,7 @@ def fit(
         at_bounds=tuple(n for n, v, a, b in zip(free, theta, lower, upper, strict=True) if v in (a, b)),
         converged=converged,
         iterations=iterations,
-        linearised=Linearised(free, current),
+        linearised=Linearised(free, current, nuisance or Nuisance()),
     )
 
 

@@ -65,7 +65,7 @@ def with_form_uncertainty(
     records : sequence of Record
         Records that were fitted, in order.
     nuisance : Nuisance
-        Disturbances that are free in every record.
+        Disturbances that are free in every record; if they are those of the fit, its linearisation is used.
     floors, noise : (r,) array_like
         Floor and noise of every record [m]; the floor is infinite for a record that only determines the state.
     span : float
@@ -84,7 +84,9 @@ def with_form_uncertainty(
     directions = gauge(fit.model, fit.names)
     bread = np.zeros((directions.shape[1],) * 2)
     meat = np.zeros_like(bread)
-    products = grams(fit.model, records, fit.names, nuisance)
+    known = fit.linearised
+    is_known = known is not None and (known.names, known.nuisance) == (fit.names, nuisance)
+    products = known.grams if known and is_known else grams(fit.model, records, fit.names, nuisance)
     for gram, floor, quiet in zip(products, floors, noise, strict=True):
         if np.isfinite(floor):
             weight = 1.0 / (gram.size * floor**2)

@@ -111,10 +111,13 @@ class Linearised:
         Parameters of the sensitivities.
     grams : sequence of Gram
         Inner products of every record.
+    nuisance : Nuisance
+        Disturbances that were eliminated.
     """
 
     names: tuple[str, ...]
     grams: Sequence[Gram]
+    nuisance: Nuisance = Nuisance()
 
 
 def grams(

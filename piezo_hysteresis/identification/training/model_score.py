@@ -63,7 +63,8 @@ def linearised(model: Model, training_data: TrainingData, known: Linearised | No
     names = tuple(adjusted_numbers(model, training_data))
     if known is not None and known.names == names:
         return known
-    return Linearised(names, grams(model, training_data.records, names, training_data.free_with(model)))
+    free = training_data.free_with(model)
+    return Linearised(names, grams(model, training_data.records, names, free), free)
 
 
 def score_of(
