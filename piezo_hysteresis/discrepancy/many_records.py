@@ -65,7 +65,7 @@ def diagnose_many(state: DiagnosisState) -> Diagnosis:
     If the error of an explicit step describes the data about as well as the effects found, it is subtracted if the
     user asked for it; otherwise the data have no verdict. A loop that depends on speed leaves a similar error, so the
     two are compared with everything that is found beside them. The search is repeated if time is left and the model
-    that was found corrects averaged samples differently.
+    that was found corrects averaged samples differently, which that of a small error does not.
     """
     setup, selection = _searched(state)
     models = [setup.baseline.model] if setup.score.excess > ADEQUATE else []
@@ -81,8 +81,8 @@ def diagnose_many(state: DiagnosisState) -> Diagnosis:
             return Diagnosis(Conclusion.INSUFFICIENT_DATA, EXPLICIT, model, model, state.experiment, where=where)
         state, (setup, selection) = freed, found
         break
-    extends = selection.in_time and selection.accepted and state.corrects_intersample_error
-    if extends and setup.changes_intersample_error(selection.model):
+    extends = setup.score.excess > ADEQUATE and selection.in_time and selection.accepted
+    if extends and state.corrects_intersample_error and setup.changes_intersample_error(selection.model):
         sharper, again = _searched(state, selection)
         setup, selection = (sharper, again) if again.in_time else (setup, selection)
     return _concluded(state, setup, selection)

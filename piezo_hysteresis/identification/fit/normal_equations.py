@@ -71,9 +71,9 @@ class Nuisance:
 
     def removed_from(self, residual: Array, record: Record) -> Array:
         """The residual of a record without these disturbances, shape (n,) [m]."""
+        if self.hum_frequency is None:
+            return residual - residual.mean() if self.offset else residual
         rows = self.rows(record, slice(0, record.size))
-        if not len(rows):
-            return residual
         return np.asarray(residual - np.linalg.lstsq(rows @ rows.T, rows @ residual, rcond=None)[0] @ rows)
 
 
