@@ -20,7 +20,7 @@ import numpy as np
 
 from .block import Array, State
 from .kernel import kernel
-from .linear import LinearBlock
+from .linear import LinearBlock, add_mixed
 
 
 @kernel
@@ -39,14 +39,6 @@ def delay_rows(x, gain, part, z, y):
             late[i] = gain * ((1.0 - part) * past[i + 1] + part * past[i])
         for k in range(before):
             z[r, k] = z[r, n + k] if n + k < before else x[r, n + k - before]
-
-
-@kernel
-def mix_two(first, second, x, y, rows):
-    """rows (p, n) = first (p,) · x (n,) + second (p,) · y (n,)."""
-    for k in range(rows.shape[0]):
-        for i in range(rows.shape[1]):
-            rows[k, i] = first[k] * x[i] + second[k] * y[i]
 
 
 class GroupDelayBlock(LinearBlock):
@@ -89,4 +81,5 @@ class GroupDelayBlock(LinearBlock):
         near, far = past[1 : 1 + x.size], past[: x.size]
         by_lag = self.gain * (far - near)
         by_gain = (1.0 - self.part) * near + self.part * far
-        mix_two(self._gain_slopes, self._lag_slopes, by_gain, by_lag, rows)
+        rows[:] = 0.0
+        add_mixed(np.array((self._gain_slopes, self._lag_slopes)), np.array((by_gain, by_lag)), rows)

@@ -21,6 +21,16 @@ from abc import abstractmethod
 import numpy as np
 
 from .block import Array, Block, State, extended
+from .kernel import kernel
+
+
+@kernel
+def add_mixed(weights, rows, out):
+    """out (j, n) += Σ_k weights (k, j) · rows (k, n); a matrix product that does not depend on how n is cut."""
+    for j in range(out.shape[0]):
+        for k in range(rows.shape[0]):
+            for i in range(rows.shape[1]):
+                out[j, i] += weights[k, j] * rows[k, i]
 
 
 class LinearBlock(Block):

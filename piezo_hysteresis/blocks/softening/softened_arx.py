@@ -31,6 +31,7 @@ from ..group_delay import GroupDelayBlock
 from ..inverses.inverted_block import InvertedBlock
 from ..inverses.linear_inverse import LinearInverse
 from ..kernel import kernel
+from ..linear import add_mixed
 from .inverted_softening import InvertedSoftening
 from .mode_path import Path, WholePath
 from .series import SeriesBlock
@@ -83,15 +84,6 @@ def linearise_mode_deviation(w, dw, x0, dx0, p, z, dz, xi, dxi):
             mode, mode_before, moved, moved_before = d_mode, mode, d_xi, moved
             dxi[r, i] = d_xi
         dz[r, 0], dz[r, 1], dz[r, 2], dz[r, 3] = mode, mode_before, moved, moved_before
-
-
-@kernel
-def add_mixed(weights, rows, out):
-    """out (j, n) += Σ_k weights (k, j) · rows (k, n); a matrix product that does not depend on how n is cut."""
-    for j in range(out.shape[0]):
-        for k in range(rows.shape[0]):
-            for i in range(rows.shape[1]):
-                out[j, i] += weights[k, j] * rows[k, i]
 
 
 class SoftenedArxBlock(Block):

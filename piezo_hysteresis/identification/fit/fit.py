@@ -29,7 +29,7 @@ from ...model.parameter_covariance import ParameterCovariance
 from ...record import Record
 from .bounded_step import bounds_of, gauge, room_of
 from .covariance import covariance
-from .normal_equations import Gram, Linearised, Nuisance, grams, residuals
+from .normal_equations import Gram, Linearised, Nuisance, grams, linearised_by, residuals
 from .stable_step import stable_step
 from .time_limit import check_time
 
@@ -177,7 +177,7 @@ def fit(
     directions = gauge(model, free)
 
     try:
-        current = known.grams if known and known.names == free else grams(model, records, free, nuisance)
+        current = linearised_by(model, records, free, nuisance, known).grams
     except DivergenceError as error:
         raise IdentificationError(f"fit: the start values diverge ({error})") from error
     iterations, small, converged, taken = 1, 0, False, True

@@ -34,7 +34,7 @@ from ...record import Record
 from .bounded_step import gauge
 from .covariance import sandwich
 from .fit import Fit
-from .normal_equations import Nuisance, grams
+from .normal_equations import Nuisance, linearised_by
 
 Array = NDArray[np.float64]
 
@@ -84,9 +84,7 @@ def with_form_uncertainty(
     directions = gauge(fit.model, fit.names)
     bread = np.zeros((directions.shape[1],) * 2)
     meat = np.zeros_like(bread)
-    known = fit.linearised
-    is_known = known is not None and (known.names, known.nuisance) == (fit.names, nuisance)
-    products = known.grams if known and is_known else grams(fit.model, records, fit.names, nuisance)
+    products = linearised_by(fit.model, records, fit.names, nuisance, fit.linearised).grams
     for gram, floor, quiet in zip(products, floors, noise, strict=True):
         if np.isfinite(floor):
             weight = 1.0 / (gram.size * floor**2)

@@ -171,6 +171,20 @@ def grams(
     return result
 
 
+def linearised_by(
+    model: Model,
+    records: Sequence[Record],
+    names: Sequence[str],
+    nuisance: Nuisance | None = None,
+    known: Linearised | None = None,
+) -> Linearised:
+    """The model linearised by the parameters `names`; `known` itself, if it is by these beside these disturbances."""
+    names, nuisance = tuple(names), nuisance or Nuisance()
+    if known is not None and (known.names, known.nuisance) == (names, nuisance):
+        return known
+    return Linearised(names, grams(model, records, names, nuisance), nuisance)
+
+
 def residuals(model: Model, records: Sequence[Record], nuisance: Nuisance | None = None) -> list[Array]:
     """Measured minus free-run displacement of every record [m], without the disturbances."""
     nuisance = nuisance or Nuisance()

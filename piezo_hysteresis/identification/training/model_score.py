@@ -24,7 +24,7 @@ from ...model.model import Model
 from ..fit.bounded_step import room_of
 from ..fit.cross_validation import Score, cross_validate, indispensable
 from ..fit.fit import Fit
-from ..fit.normal_equations import Gram, Linearised, grams
+from ..fit.normal_equations import Gram, Linearised, linearised_by
 from .adjusted_numbers import adjusted_numbers, directions
 from .training_data import TrainingData
 
@@ -60,11 +60,8 @@ def score_baseline(fit: Fit, training_data: TrainingData) -> tuple[TrainingData,
 
 def linearised(model: Model, training_data: TrainingData, known: Linearised | None = None) -> Linearised:
     """The model linearised by the parameters that a joint fit adjusts; `known` itself, if it is by these."""
-    names = tuple(adjusted_numbers(model, training_data))
-    if known is not None and known.names == names:
-        return known
-    free = training_data.free_with(model)
-    return Linearised(names, grams(model, training_data.records, names, free), free)
+    names, free = adjusted_numbers(model, training_data), training_data.free_with(model)
+    return linearised_by(model, training_data.records, names, free, known)
 
 
 def score_of(
