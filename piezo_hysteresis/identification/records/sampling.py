@@ -135,7 +135,8 @@ def resampled(record: Record, period: float) -> Record:
 
     Averages of both channels over the same samples would make the response earlier by half the difference of the
     periods: a held drive acts in the middle of its sample, the displacement is measured at its beginning. So the drive
-    is averaged over every new sample, and the displacement is taken at its beginning.
+    is averaged over every new sample, and the displacement is taken at its beginning. A record that is shorter than the
+    new period gives one sample.
 
     Parameters
     ----------
@@ -144,23 +145,22 @@ def resampled(record: Record, period: float) -> Record:
     period : float
         The new sample period [s].
     """
-    edges = period * np.arange(int(record.duration / period * (1.0 + 1e-12)) + 1)
     own = record.sample_period * np.arange(record.size + 1)
+    count = max(1, int(record.duration / period * (1.0 + 1e-12)))
+    edges = np.minimum(period * np.arange(count + 1), own[-1])
     path = record.sample_period * np.concatenate(([0.0], np.cumsum(record.voltage)))
 
     def sampled(channel: Array) -> Array:
         return np.asarray(scipy.interpolate.make_interp_spline(own[:-1], channel, min(3, record.size - 1))(edges[:-1]))
 
-    voltage = np.diff(np.interp(edges, own, path)) / period
+    voltage = np.diff(np.interp(edges, own, path)) / np.diff(edges)
     return record.with_channels(sampled, voltage=voltage, sample_period=period, initial_voltage=record.settled_voltage)
 
 
 def at_period(record: Record, period: float) -> Record:
     """The record at `period` [s], if it is faster, or slower with a drive that excites the dynamics; or unchanged."""
     if is_faster(record, period):
-        factor = round(period / record.sample_period)
-        whole = abs(factor * record.sample_period - period) < 1e-3 * period and record.size >= factor
-        return replace(record.decimate(factor), sample_period=period) if whole else _interpolated(record, period)
+        return resampled(record, period)
     slower = record.sample_period > 1.001 * period and record.size > 64
     if (
         not slower

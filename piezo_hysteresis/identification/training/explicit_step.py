@@ -35,7 +35,7 @@ from ...record import Experiment, Notice, Record
 from ..fit.cross_validation import cross_validate
 from ..fit.normal_equations import grams
 from ..records.conditioning import with_conditioning
-from ..records.sampling import at_period, is_faster, less
+from ..records.sampling import is_faster, less, resampled
 from .adjusted_numbers import adjusted_numbers, directions
 from .joint_fit import FAILURES, LATER, joint
 from .training_data import TrainingData
@@ -117,7 +117,7 @@ def _share(model: Model, training_data: TrainingData, changes: list[Array]) -> f
 def without_steps(experiment: Experiment, model: Model) -> Experiment:
     """The experiment without the error of the explicit step, with a notice about this."""
     period = model.sample_period
-    records = tuple(at_period(r, period) if is_faster(r, period) else r for r in experiment.records)
+    records = tuple(resampled(r, period) if is_faster(r, period) else r for r in experiment.records)
     freed = less(records, step_changes(model, records))
     message = (
         "the data were simulated with the explicit step of Eq. (7), which no real stage takes; its "
