@@ -45,8 +45,8 @@ class DaqmxSetup:
     sample_period_min : float
         Shortest sample period for this card [s].
     lead : float
-        Duration of output in the buffer of the card [s]. It is the latency of the stage, and the time by which a block
-        may be late.
+        Duration of output in the buffer of the card [s], and the time by which a block may be late. The latency of the
+        stage is `lead` and `io_delay`, in whole samples.
     voltage_min, voltage_max : float
         Limits of the drive before the amplifier [V].
     max_slew_rate : float
@@ -69,7 +69,7 @@ class DaqmxSetup:
         The sensor's output and the inputs span ± this voltage [V].
     io_delay : float
         Delay of the card from output to input, measured by `loop_back_delay` [s]. Its whole samples are subtracted, so
-        that the remaining delay is that of the stage; irrelevant where the drive is measured.
+        that the remaining delay is that of the stage. Where the drive is measured, only the labels depend on it.
     timeout : float
         Longest wait for samples beyond their own duration, and longest time without an answer of a server [s].
 
@@ -127,8 +127,18 @@ class DaqmxSetup:
         if not 0 <= self.io_delay < 1:
             raise StageError(f"nidaqmx.io_delay: got {self.io_delay!r} s, expected 0 to 1 s")
 
+    @property
+    def lead_samples(self) -> int:
+        """Number of samples in the output buffer."""
+        return max(round(self.lead / self.sample_period), 1)
+
+    @property
+    def latency_samples(self) -> int:
+        """Number of samples between a drive and the reading that shows it: output buffer, and delay of the card."""
+        return self.lead_samples + round(self.io_delay / self.sample_period)
+
     def description(self) -> Description:
-        """Limits and scales of the stage; `latency` is that of the output buffer."""
+        """Limits and scales of the stage, and its latency at this sample period."""
         s = self
         scale = abs(s.sensor_gain) * s.sensor_range
         return Description(
@@ -144,5 +154,5 @@ class DaqmxSetup:
             displacement_min=-scale,
             displacement_max=scale,
             measured_voltage=bool(s.voltage_input),
-            latency=s.lead,
+            latency=s.latency_samples * s.sample_period,
         )

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,8 +40,8 @@ _CLIPPED = 0.998
 class DaqmxStage:
     """A streaming stage: output and input on one hardware clock, without regeneration.
 
-    A block waits in the output buffer for `Description.latency`. `exchange` returns the samples that were applied and
-    measured that long before. A block that comes too late ends the stream with an error.
+    A block waits in the output buffer for `DaqmxSetup.lead`. `exchange` returns the samples that were applied and
+    measured `Description.latency` before. A block that comes too late ends the stream with an error.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ class DaqmxStage:
         self._description = setup.description()
         self._output = OutputVoltage(setup, self._tasks, self._description)
         self._limiter = Limiter(self._description)
-        self._sample_period = self._description.check_sample_period(setup.sample_period)
+        self._description.check_sample_period(setup.sample_period)
         self._voltage = self._description.safe_voltage
         self._waiting: Samples = np.empty(0)
         self._readings: Samples = np.empty(0)
@@ -80,13 +81,13 @@ class DaqmxStage:
 
     @property
     def description(self) -> Description:
-        """Limits and scales from the setup; `latency` is that of the output buffer."""
+        """Limits and scales from the setup; `latency` is that of the present sample period."""
         return self._description
 
     @property
     def sample_period(self) -> float:
         """Present sample period [s]."""
-        return self._sample_period
+        return self._setup.sample_period
 
     @property
     def voltage(self) -> float:
@@ -97,10 +98,11 @@ class DaqmxStage:
         """Set the sample period [s]. A running stream ends at its last voltage."""
         self._require_open()
         period = self._description.check_sample_period(sample_period)
-        if period != self._sample_period:
+        if period != self.sample_period:
             with self._guarded():
                 self._drain()
-            self._sample_period = period
+            self._setup = replace(self._setup, sample_period=period)
+            self._description = self._setup.description()
 
     def restrict(self, limits: Description, ramp_rate: float) -> None:
         """Use these limits and this ramp rate [V/s] from now on; see `Limiter.restricted`."""
@@ -110,7 +112,7 @@ class DaqmxStage:
     def exchange(self, voltage: Samples) -> Acquired:
         """Give a block of drive voltages [V]; returns as many samples, applied and measured `latency` earlier."""
         self._require_open()
-        drive = self._limiter.check(voltage, self._voltage, self._sample_period)
+        drive = self._limiter.check(voltage, self._voltage, self.sample_period)
         with self._guarded():
             return self._stream(drive)
 
@@ -160,16 +162,11 @@ class DaqmxStage:
             self._closed = True
             self._tasks.close()
 
-    @property
-    def _lead(self) -> int:
-        return max(round(self._setup.lead / self._sample_period), 1)
-
     def _stream(self, drive: Samples) -> Acquired:
         if not self._tasks.is_running:
             self._output.require(self._voltage)
-            delayed = self._lead + round(self._setup.io_delay / self._sample_period)
-            self._waiting = np.full(delayed, self._voltage)
-            self._tasks.start(self._sample_period, np.full(self._lead, self._voltage))
+            self._waiting = np.full(self._setup.latency_samples, self._voltage)
+            self._tasks.start(self.sample_period, np.full(self._setup.lead_samples, self._voltage))
             self._agreement, self._readings = self._new_agreement(), np.empty(0)
         self._tasks.write(drive)
         self._voltage = float(drive[-1])
@@ -186,14 +183,14 @@ class DaqmxStage:
 
     def _new_agreement(self) -> Agreement:
         s, d = self._setup, self._description
-        settling = int(np.ceil(s.settling_time / self._sample_period))
+        settling = int(np.ceil(s.settling_time / self.sample_period))
         inside = _CLIPPED * d.displacement_max
         return Agreement(s.voltage_tolerance / abs(s.amplifier_gain), settling, -inside, inside)
 
     def _drain(self) -> None:
         """End the stream after its last voltage was put out."""
         if self._tasks.is_running:
-            self._stream(np.full(self._lead, self._voltage))
+            self._stream(np.full(self._setup.lead_samples, self._voltage))
             self._tasks.stop()
 
     def _guarded(self) -> AbstractContextManager[None]:
@@ -207,7 +204,7 @@ class DaqmxStage:
         elif self._tasks.is_running:
             try:
                 goal = self._description.safe_voltage
-                for part in self._limiter.ramp(self._voltage, goal, self._sample_period, self._lead):
+                for part in self._limiter.ramp(self._voltage, goal, self.sample_period, self._setup.lead_samples):
                     self._stream(part)
                 self._drain()
             except DeviceError:
@@ -226,7 +223,7 @@ class DaqmxStage:
 
     def _go(self, goal: float) -> None:
         """Go to a voltage [V] by the ramp of the limiter, on the clock of the card; no stream is running."""
-        period = max(min(self._sample_period, _RAMP_PERIOD), self._description.sample_period_min)
+        period = max(min(self.sample_period, _RAMP_PERIOD), self._description.sample_period_min)
         for part in self._limiter.ramp(self._voltage, goal, period):
             if part.size > 1:
                 self._tasks.play(part, period)

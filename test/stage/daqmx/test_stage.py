@@ -16,11 +16,16 @@
 
 import math
 import sys
+import threading
 import time
 
 import numpy as np
 import pytest
 
+from piezo_hysteresis.acquisition.drive import EventKind
+from piezo_hysteresis.acquisition.playback import Playback
+from piezo_hysteresis.acquisition.streaming import StreamingAcquisition
+from piezo_hysteresis.acquisition.time_base import TimeBase
 from piezo_hysteresis.errors import StageError
 from piezo_hysteresis.stage.daqmx.loop_back import loop_back_delay
 from piezo_hysteresis.stage.daqmx.setup import DaqmxSetup
@@ -117,6 +122,47 @@ def test_the_delay_of_the_card_is_measured_apart_and_taken_off(opened, streamed)
     voltage, echo = streamed(corrected, WAVE, 1000)
     np.testing.assert_allclose(echo, voltage, atol=2e-4)
     corrected.close()
+
+
+@pytest.mark.parametrize(("lead", "io_delay"), [(LEAD, 0.0), (LEAD, 2.0), (0.3, 0.0), (0.3, 2.0)])
+def test_a_label_lies_on_the_drive_of_its_phase(opened, lead, io_delay):
+    """Whatever the delays, the samples of a phase are its waveform, all of it and nothing else."""
+    _, stage = opened(
+        displacement_input="ai2", voltage_input="", sensor_gain=1.0, lead=lead * TS, io_delay=io_delay * TS
+    )
+    deliveries, failures, done = [], [], threading.Event()
+
+    def deliver(delivery):
+        deliveries.append(delivery)
+        if any(e.kind is EventKind.DONE for e in delivery.events):
+            done.set()
+
+    playback = Playback(0.0, 0.0, TS, 1e6)
+    acquisition = StreamingAcquisition(stage, playback, TimeBase(TS), 300, time.time_ns, deliver, failures.append)
+    wave = WAVE + 1.0
+    phase = acquisition.play(wave, "wave", 1, lambda wave, voltage: None, lambda phase, size: None)
+    acquisition.start()
+    assert done.wait(30.0), failures
+    assert acquisition.make_safe(30.0)
+    voltage, displacement, label, index = (
+        np.concatenate([getattr(d.block, name) for d in deliveries])
+        for name in ("voltage", "displacement", "phase", "index")
+    )
+    np.testing.assert_array_equal(voltage[label == phase.number], wave)
+    if io_delay:
+        np.testing.assert_allclose(displacement[label == phase.number], wave, atol=2e-4)
+    told = {e.kind: d.first + e.offset for d in deliveries for e in d.events if e.phase == phase}
+    where = index[label == phase.number]
+    assert told == {EventKind.BEGAN: where[0], EventKind.DONE: where[-1] + 1}
+    stage.close()
+
+
+def test_the_latency_of_a_stage_is_that_of_its_sample_period(opened):
+    _, stage = opened(lead=0.01, io_delay=41e-6)
+    assert stage.description.latency == pytest.approx(502 * TS)
+    stage.configure(0.1)
+    assert stage.description.latency == pytest.approx(0.1), "the least buffer is one sample"
+    stage.close()
 
 
 def test_an_unconnected_input_has_no_delay(opened):
