@@ -29,9 +29,6 @@ import yaml
 from piezo_hysteresis.stage.hidden import HIDDEN_EFFECTS, hidden_effect
 from piezo_hysteresis.stage.plant import PlantParameters
 
-HIGHEST_VOLTAGE = 10.0
-"""Top of the range that the protocols use [V]."""
-
 INDIVIDUAL = (
     "hysteresis.A",
     "hysteresis.beta",
@@ -59,7 +56,7 @@ def main() -> None:
     parser.add_argument("--name", choices=HIDDEN_EFFECTS, help="hide this effect; only its size is drawn")
     arguments = parser.parse_args()
     stage = individual_stage(arguments.seed)
-    hidden = hidden_effect(arguments.seed, stage, name=arguments.name, highest_voltage=HIGHEST_VOLTAGE)
+    hidden = hidden_effect(arguments.seed, stage, name=arguments.name)
     mapping = {key: list(v) if isinstance(v, tuple) else v for key, v in hidden.parameters.to_mapping().items()}
     sizes = ", ".join(f"{name} = {value}" for name, value in hidden.changes.items())
     arguments.file.write_text(f"# hidden: {hidden.name} ({sizes})\n" + yaml.safe_dump(mapping, sort_keys=False))

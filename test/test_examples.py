@@ -53,7 +53,7 @@ def test_hide_effect_prints_no_answer_and_writes_the_plant_of_the_seed(tmp_path)
     assert done.stdout + done.stderr == ""
     written = PlantParameters.from_mapping(yaml.safe_load((tmp_path / "plant.yaml").read_text()))
     assert written.full_stroke != PlantParameters().full_stroke
-    assert written == hidden_effect(3, written, highest_voltage=10.0).parameters
+    assert written == hidden_effect(3, written).parameters
 
 
 def test_own_stage(capsys):

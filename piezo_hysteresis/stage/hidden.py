@@ -49,7 +49,7 @@ class HiddenEffect:
 
 
 def hidden_effect(
-    seed: int, base: PlantParameters | None = None, *, name: str | None = None, highest_voltage: float = 6.0
+    seed: int, base: PlantParameters | None = None, *, name: str | None = None, highest_voltage: float | None = None
 ) -> HiddenEffect:
     """Draw one effect of the catalogue and its size. The size is realistic, and large enough to be found.
 
@@ -61,8 +61,8 @@ def hidden_effect(
         Stage that gets the effect, in addition to hidden effects that it already has. Default: a stage without any.
     name : str, optional
         Draw only the size of this effect.
-    highest_voltage : float
-        Highest drive of the experiment [V]; saturation is drawn near it.
+    highest_voltage : float, optional
+        Highest drive of the experiment [V]; saturation is drawn near it. Default: the highest that the stage accepts.
 
     Returns
     -------
@@ -79,7 +79,8 @@ def hidden_effect(
     chosen = drawn if name is None else name
     if chosen not in _DRAWS:
         raise ParameterError(f"hidden effect: got {chosen!r}, expected one of {', '.join(HIDDEN_EFFECTS)}")
-    changes = _DRAWS[chosen](rng, base, highest_voltage)
+    highest = base.electronics.voltage_max if highest_voltage is None else highest_voltage
+    changes = _DRAWS[chosen](rng, base, highest)
     return HiddenEffect(chosen, changes, base.with_values(changes))
 
 

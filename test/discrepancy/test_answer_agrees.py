@@ -21,7 +21,7 @@ import pytest
 
 from benchmarks.naming_cases import Case
 from examples.demo.truth import in_numbers_of
-from examples.hide_effect import HIGHEST_VOLTAGE, individual_stage
+from examples.hide_effect import individual_stage
 from piezo_hysteresis.discrepancy import Verdict, diagnose, gap
 from piezo_hysteresis.discrepancy.gap import measure_gap
 from piezo_hysteresis.effects import MainsHum
@@ -40,9 +40,7 @@ HUM = Case("poor", ("mains_hum",), 1, 3e-4, "packaged")
 
 def recorded(seed):
     plan = protocol.short(DriveLimits(), 0)
-    stage = SimulatedStage(
-        hidden_effect(seed, individual_stage(seed), highest_voltage=HIGHEST_VOLTAGE).parameters, seed=seed
-    )
+    stage = SimulatedStage(hidden_effect(seed, individual_stage(seed)).parameters, seed=seed)
     stage.configure(plan.limits.sample_period)
     return Experiment(tuple(stage.play(p.voltage, p.name, average=p.stored_every) for p in plan))
 
@@ -89,7 +87,7 @@ def test_a_model_that_diverges_on_a_test_record_is_not_named(monkeypatch):
 def test_every_stage_of_the_demonstration_is_reported_the_same_everywhere(seed):
     found = diagnose(recorded(seed))
     check_agreement(found)
-    hidden = hidden_effect(seed, individual_stage(seed), highest_voltage=HIGHEST_VOLTAGE)
+    hidden = hidden_effect(seed, individual_stage(seed))
     same = in_numbers_of(found.model, hidden.parameters, hidden.changes) if found.names else {}
     for name, value in same.items():
         effect, _, number = name.partition(".")

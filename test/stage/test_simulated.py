@@ -15,14 +15,17 @@
 """Both kinds of simulated stage keep the promises of the stage protocol."""
 
 import math
+from argparse import ArgumentParser
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from piezo_hysteresis.cli.options.plant_option import add_plant_arguments, plant
 from piezo_hysteresis.errors import StageError
+from piezo_hysteresis.stage.opening import Opening
 from piezo_hysteresis.stage.plant import Plant, PlantParameters
-from piezo_hysteresis.stage.simulated import SimulatedMemoryStage, SimulatedStage
+from piezo_hysteresis.stage.simulated import BACK_END, SimulatedMemoryStage, SimulatedStage
 from piezo_hysteresis.stage.stage import MemoryStage, Stage, StreamingStage
 
 TS = 20e-6
@@ -47,6 +50,19 @@ def test_each_kind_of_stage_declares_its_protocol(kind, protocol):
     assert promised(protocol) <= set(dir(stage))
     assert stage.description.streaming is (protocol is StreamingStage)
     assert stage.sample_period == TS
+
+
+def test_a_driver_hides_the_same_effect_as_piezo(tmp_path):
+    """For every effect of the catalogue, also on a stage with another range."""
+    plant_file = tmp_path / "plant.yaml"
+    plant_file.write_text("electronics.voltage_max: 7.0\n")
+    parser = ArgumentParser()
+    add_plant_arguments(parser)
+    values = {row.name: row.value for row in BACK_END.rows} | {"plant_file": str(plant_file)}
+    for seed in range(60):
+        simulated, _ = plant(parser.parse_args(["--plant", str(plant_file), "--hidden", str(seed)]))
+        driven = BACK_END.open(values | {"hidden_effect": seed}, Opening())
+        assert driven.parameters == simulated, seed
 
 
 def test_streaming_is_the_plant_sample_by_sample():

@@ -52,7 +52,7 @@ def plant(args: argparse.Namespace) -> tuple[PlantParameters, dict[str, Any]]:
         parameters = parameters.with_values({"sensor.noise": args.noise})
     if args.hidden is None:
         return parameters, {"name": None, "changes": {}}
-    hidden = hidden_effect(args.hidden, parameters, highest_voltage=parameters.electronics.voltage_max)
+    hidden = hidden_effect(args.hidden, parameters)
     return hidden.parameters, {"name": hidden.name, "changes": hidden.changes}
 
 
