@@ -22,6 +22,7 @@ import numpy as np
 
 from ..errors import StageError
 from .drive import Drive, Event, EventKind, Phase
+from .playback import Playback
 
 
 class RecordedPlayback:
@@ -86,3 +87,7 @@ class RecordedPlayback:
     def stop(self) -> Phase:
         """Do nothing: a replayed stage has no voltage to remove."""
         return self.phase
+
+
+Source = Playback | RecordedPlayback
+"""What gives an acquisition its samples."""

@@ -30,13 +30,13 @@ from ..stage.stage import Stage
 from .command_check import CommandCheck
 from .memory import MemoryAcquisition
 from .playback import Playback
-from .recorded_playback import RecordedPlayback
+from .recorded_playback import RecordedPlayback, Source
 from .safety.keeper_link import KeeperLink
 from .safety.stop_latch import StopLatch
 from .sample_block import Delivery
 from .settings import DriverSettings
 from .stage_lock import StageLock
-from .streaming import Source, StreamingAcquisition
+from .streaming import StreamingAcquisition
 from .time_base import TimeBase
 
 _KEEPER_TIME = 10.0

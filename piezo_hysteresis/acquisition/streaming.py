@@ -26,14 +26,11 @@ from ..stage.stage import Acquired, Samples, Stage, StreamingStage
 from .device_clock import DeviceClock
 from .drive import Drive, OpenCommands, Phase
 from .latency_buffer import LatencyBuffer
-from .playback import Playback
-from .recorded_playback import RecordedPlayback
+from .recorded_playback import Source
 from .safety.keeper_link import KeeperLink, NoKeeper
 from .safety.stop_latch import StopLatch
 from .sample_block import Delivery, SampleBlock, Tally
 from .time_base import LATEST_STAMP, TimeBase, read_together
-
-Source = Playback | RecordedPlayback
 
 
 class StreamingAcquisition:
@@ -85,12 +82,11 @@ class StreamingAcquisition:
         self._deliver, self._fail, self._ready = deliver, fail, ready
         self._late = LatencyBuffer(round(stage.description.latency / time_base.sample_period), playback.phase.number)
         self._device_clock = DeviceClock(time_base) if stage.description.latency else None
-        self._latch = StopLatch() if latch is None else latch
-        self._keeper = NoKeeper() if keeper is None else keeper
+        self._latch, self._keeper = latch or StopLatch(), keeper or NoKeeper()
         self._open, self._is_abandoned = OpenCommands(), False
-        self._access = threading.Lock()
-        self._ending, self._halting = threading.Event(), threading.Event()
-        self._safe = threading.Event()
+        self._access = threading.Lock()  # for the playback: nothing slow is done with it
+        self._accepting = threading.Lock()  # until the acceptance is reported; taken before `_access`
+        self._ending, self._halting, self._safe = threading.Event(), threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="acquisition", daemon=True)
 
     def start(self) -> None:
@@ -114,14 +110,15 @@ class StreamingAcquisition:
         check : callable
             Called with the waveform and the present voltage [V]; it raises StageError to refuse the waveform.
         accepted : callable
-            Called with the phase and the number of samples before the first sample is applied.
+            Called with the phase and its number of samples before an event of the phase is delivered.
         """
-        with self._access:
-            self._latch.require_released(name)
-            self._require_free(name)
-            check(waveform, self.playback.voltage)
-            phase = self.playback.play(waveform, name, stamp)
-            self._open.add(phase)
+        with self._accepting:
+            with self._access:
+                self._latch.require_released(name)
+                self._require_free(name)
+                check(waveform, self.playback.voltage)
+                phase = self.playback.play(waveform, name, stamp)
+                self._open.add(phase)
             accepted(phase, waveform.size)
             return phase
 
@@ -149,11 +146,8 @@ class StreamingAcquisition:
     def make_safe(self, timeout: float) -> bool:
         """Stop, wait until the stage has reported the safe voltage, and end the thread.
 
-        Returns
-        -------
-        bool
-            False if the stage was not at the safe voltage within `timeout` [s]. True also if the thread had failed
-            before: it has then made the stage safe or reported that it could not.
+        Returns False if the stage was not at the safe voltage within `timeout` [s]. True also if the thread had failed
+        before: it has then made the stage safe or reported that it could not.
         """
         if not self.is_running:
             self._halting.set()  # it may be about to begin, if an interrupt came while it was started
@@ -222,7 +216,7 @@ class StreamingAcquisition:
         with self._access:
             events = self._open.stop(reason)
         if events:
-            self._deliver(Delivery.without_samples(self.index, events))
+            self._hand_over(Delivery.without_samples(self.index, events))
 
     def _step(self) -> None:
         if self._device_clock is None and not self._keep_pace():
@@ -260,4 +254,11 @@ class StreamingAcquisition:
         self.index = first + block.size
         self._open.follow(drive.events)
         if not self._is_abandoned:
-            self._deliver(Delivery(block, first, drive.events))
+            self._hand_over(Delivery(block, first, drive.events))
+
+    def _hand_over(self, delivery: Delivery) -> None:
+        """Deliver, after the commands that begin or end here were reported as accepted."""
+        if delivery.events:
+            with self._accepting:
+                pass
+        self._deliver(delivery)

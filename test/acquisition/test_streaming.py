@@ -94,6 +94,43 @@ def test_make_safe_ramps_down_and_gives_every_sample_of_it():
     assert not listener.failures
 
 
+@pytest.mark.parametrize("lead", [0.0, 1.0])
+def test_neither_the_stream_nor_a_stop_waits_for_the_report_of_a_command(lead):
+    """And still, what is reported first is that the command was accepted."""
+    stage = OwnClock(1.0, lead) if lead else Witness(PERIOD, RAMP_RATE)
+    acquisition, listener = started(stage, rate=1.0)
+    reports, writable = [], threading.Event()
+
+    def accepted(phase, size):
+        assert writable.wait(30.0)
+        reports.append("accepted")
+
+    def deliver(delivery):
+        reports.extend(e.kind.value for e in delivery.events if e.phase.name == "slow")
+        listener.deliver(delivery)
+
+    acquisition._deliver = deliver
+    asked = ("slow", 1, lambda wave, voltage: None, accepted)
+    reporting = threading.Thread(target=acquisition.play, args=(np.linspace(0, 5, 50_000), *asked))
+    reporting.start()
+    try:
+        while not acquisition.playback.is_playing:
+            time.sleep(1e-3)
+        before = len(listener.deliveries)
+        if lead:  # so many samples are on their way before the first one of the command
+            listener.wait(lambda heard: heard.failures or len(heard.deliveries) > before + 20)
+        stopping = threading.Thread(target=acquisition.stop)
+        stopping.start()
+        stopping.join(10.0)
+        assert acquisition.playback.is_stopping or acquisition.playback.is_safe
+    finally:
+        writable.set()
+        reporting.join(30.0)
+    assert acquisition.make_safe(30.0)
+    assert not listener.failures
+    assert reports == ["accepted", "began", "stopped"]
+
+
 def test_a_failing_stage_is_made_safe_and_reported_once():
     stage = Witness(PERIOD, RAMP_RATE, fails_at=3)
     acquisition, listener = started(stage)
