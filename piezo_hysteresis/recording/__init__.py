@@ -35,7 +35,7 @@
 ``step_before``       the displacement jumps with the first sample: a step from rest was not recorded
 ``rows_before``       rows before the chosen ones were read to determine the initial state
 ``proposed``          names of phases that were proposed from the shape of the drive
-``left_out``          a phase with fewer samples than are averaged into one
+``left_out``          a phase, or a part of one, with fewer samples than are averaged into one
 ``averaged``          a recording too long for the memory, averaged on reading
 ``columns`` ``held``  the assignment of channels in a file of other software
 ``time_base``         times that are uneven, overlap, or are those of reception
@@ -48,6 +48,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -66,6 +67,7 @@ from .formats.known_formats import FORMATS, Format, TextFormat, WritableFormat
 from .formats.mat import Mat
 from .formats.npz import Npz
 from .rows_before import with_rows_before
+from .segmentation.decimating_buffer import left_out_notice
 from .segmentation.decimation import load_decimation
 from .table.read_options import Column, ReadOptions
 
@@ -102,7 +104,7 @@ def read(
         Information that the file does not contain; see `ReadOptions`.
     decimate : mapping of str to int, optional
         Phase name to the number of samples that are averaged into one on reading (`Record.decimate`); default: the
-        values that the identification node has written beside its bag, if any.
+        values that the identification node has written beside its bag, if any. A shorter record is left out.
     rows_before : int
         Largest number of rows in front of `rows` that are read too, as a phase ``conditioning``. The stage is not
         fitted or judged there, but its state is carried into `rows`. Without effect if `initial_voltage` is given.
@@ -115,7 +117,7 @@ def read(
     Raises
     ------
     RecordingError
-        If the path cannot be read as an experiment, or `decimate` names an unknown phase.
+        If the path cannot be read as an experiment, `decimate` names an unknown phase, or every record is left out.
     RecordError
         If the samples do not form a record.
     """
@@ -124,6 +126,7 @@ def read(
     options = ReadOptions(
         axis, columns or {}, units or {}, sample_period, initial_voltage, rows, phases, include, average
     )
+    phases_found: list[str] = []
     records: list[Record] = []
     notices: list[Notice] = []
     for path in paths:
@@ -132,16 +135,32 @@ def read(
         if axis is not None and not isinstance(chosen, Rosbag2):
             raise RecordingError(f"{path}: `axis`: got '{axis}', expected none; only a bag has namespaces of stages")
         found = with_rows_before(partial(_parts, place, chosen), options, rows_before)
-        factors = load_decimation(place) if decimate is None else decimate
-        by_record = [(r, factors.get(r.phase, factors.get(r.phase.split("_")[0]))) for r in found]
-        records += [r if factor is None else r.decimate(factor) for r, factor in by_record]
-        notices += found.notices
-    names = {name for r in records for name in (r.phase, r.phase.split("_")[0])}
-    if unknown := set(decimate or ()) - names:
-        held = ", ".join(dict.fromkeys(r.phase for r in records))
+        kept, left_out = _averaged(found, load_decimation(place) if decimate is None else decimate)
+        phases_found += [r.phase for r in found]
+        records += kept
+        notices += [*found.notices, *left_out]
+    if unknown := set(decimate or ()) - {name for phase in phases_found for name in (phase, phase.split("_")[0])}:
+        held = ", ".join(dict.fromkeys(phases_found))
         raise RecordingError(f"{paths[0]}: `decimate`: no phase {min(unknown)!r}, expected one of {held}")
+    if not records:
+        raise RecordingError(f"{paths[0]}: {notices[-1].message}; expected a phase with enough samples")
     experiment = Experiment(tuple(records), ", ".join(str(in_home(path)) for path in paths))
     return experiment.noting(*notices, *inspect(experiment, options.units.get("displacement")))
+
+
+def _averaged(experiment: Experiment, factors: Mapping[str, int]) -> tuple[list[Record], list[Notice]]:
+    """The records with samples averaged by phase, without those that are too short for that, and what was left out."""
+    records: list[Record] = []
+    notices: list[Notice] = []
+    for record in experiment:
+        factor = factors.get(record.phase, factors.get(record.phase.split("_")[0]))
+        if factor is not None and factor > record.size:
+            notices.append(left_out_notice(record.size, factor, record.phase))
+            continue
+        if notices and not records and record.continues:  # the record that it continues was left out
+            record = replace(record, continues=False, truncated=True)
+        records.append(record if factor is None else record.decimate(factor))
+    return records, notices
 
 
 def from_columns(

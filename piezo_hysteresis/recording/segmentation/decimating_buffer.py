@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import RecordingError
+from ...errors import RecordingError, counted
 from ...record import Notice, Samples
 from ..table.read_options import ReadOptions
 
@@ -47,6 +47,12 @@ def averaged_notice(average: int, sample_period: float, phase: str = "") -> Noti
         "choose a part by `rows`, which is read at the full rate, or set `average` to 1",
         phase,
     )
+
+
+def left_out_notice(size: int, average: int, phase: str = "") -> Notice:
+    """Notice about a record that is too short for the average."""
+    text = f"a record of {counted(size, 'sample')} was left out, because {average} are averaged into one"
+    return Notice("left_out", text, phase)
 
 
 def shared_averages(sizes: Sequence[int], average: int | None) -> list[int]:

@@ -35,6 +35,37 @@ def test_slow_phases_are_averaged_on_reading(tmp_path):
     assert [r.size for r in read(tmp_path / "run", decimate={})] == [100, 100]
 
 
+def run_of(folder, *sizes):
+    """A bag of phases `rest` of these sizes, of which 10 samples are averaged into one, and a phase `step`."""
+    records = []
+    for name, size in [*(("rest", n) for n in sizes), ("step", 100)]:
+        voltage = np.arange(float(size))
+        records.append(Record(voltage, 1e-6 * voltage, 1e-3, name, continues=bool(records)))
+    write(Experiment(tuple(records)), folder)
+    save_decimation(folder, {"rest": 10})
+    return folder
+
+
+@pytest.mark.parametrize("sizes", [(100, 9), (9, 100)])
+def test_a_piece_too_short_to_average_is_left_out_and_the_others_are_read(tmp_path, sizes):
+    experiment = read(run_of(tmp_path / "run", *sizes))
+    assert [(r.phase, r.size) for r in experiment] == [("rest", 10), ("step", 100)]
+    (notice,) = (n for n in experiment.notices if n.kind == "left_out")
+    assert notice.phase == "rest" and notice.message.startswith("a record of 9 samples was left out")
+
+
+def test_no_state_is_carried_to_a_record_whose_beginning_was_left_out(tmp_path):
+    later = read(run_of(tmp_path / "a"), run_of(tmp_path / "b", 9))[1]
+    assert later.truncated and not later.continues
+
+
+def test_a_recording_of_which_nothing_is_left_is_refused_with_the_reason(tmp_path):
+    record = Record(np.zeros(9), np.zeros(9), 1e-3, "rest")
+    write(Experiment((record,)), tmp_path / "run")
+    with pytest.raises(RecordingError, match="a record of 9 samples was left out, because 10 are averaged"):
+        read(tmp_path / "run", decimate={"rest": 10})
+
+
 @pytest.mark.parametrize("text", ["- 1", "triangle: 0", "triangle: ten", "[", "\xff"])
 def test_a_broken_file_is_reported(tmp_path, text):
     (tmp_path / FILE).write_text(text, encoding="latin-1")
