@@ -204,7 +204,7 @@ class IdentificationNode(GuardedNode):
         self._moves = True
         self._status.experiment, self._status.owner = str(path), self._driver.owner
         yield from run_protocol(self, self._driver, plan, path)
-        save_decimation(path, {phase.name: phase.stored_every for phase in planned[0]})
+        save_decimation(path, [(phase.name, phase.stored_every) for phase in planned[0]])
         self._folder.last = path
         yield from self._fit(identification, path)
 

@@ -45,7 +45,7 @@ class LiveProtocols:
         self._path, self._settings, self._inform = path, settings, inform
         self._process: LiveProcess | None = None
         self._last: Protocol | None = None
-        self._averaged: dict[str, int] = {}
+        self._averaged: list[tuple[str, int]] = []
         self._found: Outcome | None = None
 
     @property
@@ -60,7 +60,7 @@ class LiveProtocols:
         if self._process is None:
             self._process = LiveProcess(self._path, limits, self._settings)
         elif self._last is not None:
-            self._averaged |= {phase.name: phase.stored_every for phase in self._last}
+            self._averaged += [(phase.name, phase.stored_every) for phase in self._last]
             save_decimation(self._path, self._averaged)
             self._process.played(self._last.phases)
         while not isinstance(answer := self._process.poll(), Outcome):

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 import yaml
@@ -28,9 +28,15 @@ FILE = "decimate.yaml"
 """Name of the file in the folder of the bag."""
 
 
-def save_decimation(folder: Path, factors: Mapping[str, int]) -> None:
-    """Write phase names and the numbers of samples that are averaged into one (`Record.decimate`)."""
-    text = "# Samples averaged into one on reading, by phase.\n" + yaml.safe_dump(dict(factors))
+def save_decimation(folder: Path, phases: Iterable[tuple[str, int]]) -> None:
+    """Write phase names and the numbers of samples that are averaged into one (`Record.decimate`).
+
+    Of several phases with one name the smallest number counts, so that none is averaged more than planned.
+    """
+    factors: dict[str, int] = {}
+    for name, number in phases:
+        factors[name] = min(number, factors.get(name, number))
+    text = "# Samples averaged into one on reading, by phase.\n" + yaml.safe_dump(factors)
     try:
         (folder / FILE).write_text(text, encoding="utf-8")
     except OSError as error:

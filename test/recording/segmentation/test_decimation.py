@@ -28,11 +28,17 @@ def test_slow_phases_are_averaged_on_reading(tmp_path):
     records = [Record(voltage, 1e-6 * voltage, 1e-3, phase=name) for name in ("triangle", "step")]
     write(Experiment(tuple(records)), tmp_path / "run", format="rosbag2")
     assert load_decimation(tmp_path / "run") == {}
-    save_decimation(tmp_path / "run", {"triangle": 10})
+    save_decimation(tmp_path / "run", [("triangle", 10)])
     triangle, step = read(tmp_path / "run")
     assert (triangle.sample_period, step.sample_period) == (1e-2, 1e-3)
     np.testing.assert_array_equal(triangle.voltage, voltage.reshape(10, 10).mean(axis=1))
     assert [r.size for r in read(tmp_path / "run", decimate={})] == [100, 100]
+
+
+def test_no_phase_is_averaged_more_than_planned_because_of_another_of_its_name(tmp_path):
+    planned = [("rest", 50), ("step", 1), ("rest", 500), ("sine_1hz", 5)]
+    save_decimation(tmp_path, planned)
+    assert load_decimation(tmp_path) == {"rest": 50, "step": 1, "sine_1hz": 5}
 
 
 def run_of(folder, *sizes):
@@ -42,7 +48,7 @@ def run_of(folder, *sizes):
         voltage = np.arange(float(size))
         records.append(Record(voltage, 1e-6 * voltage, 1e-3, name, continues=bool(records)))
     write(Experiment(tuple(records)), folder)
-    save_decimation(folder, {"rest": 10})
+    save_decimation(folder, [("rest", 10)])
     return folder
 
 
