@@ -24,7 +24,7 @@ import numpy as np
 from ...errors import RecordingError
 from ...record import Notice, Record
 from ..checks.split_at_gaps import LARGEST, split_at_gaps
-from ..segmentation.decimating_buffer import averaged_notice
+from ..segmentation.decimating_buffer import averaged_notice, left_out_notice
 from ..segmentation.phases import labelled
 from ..segmentation.segment import Segment
 from ..segmentation.waveform import phase_name
@@ -61,6 +61,7 @@ def records_of(
     unlabelled = options.phases is not None or (not names and all(s.phase == 0 for s in segments))
     records: list[Record] = []
     notices: list[Notice] = []
+    short: list[int] = []
     moving = _MOVED * max(_travel(segment) for segment in segments)
     before: Segment | None = None
     kept = excited = unknown = False
@@ -79,14 +80,14 @@ def records_of(
             )
             notices.append(Notice("moved", text, name))
         if not left_out:
-            begins = segment.phase == 0 if segment.first else segment.lost == 0 and not unknown
+            begins = segment.phase == 0 if segment.first else slow.lost == 0 and not unknown
             if excited and not kept:
                 notices.append(
                     Notice("history", "earlier phases were not recorded; the stage is assumed to have settled", name)
                 )
             if not slow.size:
-                text = f"its {segment.size} samples are fewer than the {average} to be averaged; the phase was left out"
-                notices.append(Notice("averaged", text, name))
+                notices.append(left_out_notice(segment.size, average, name))
+                short.append(segment.size)
                 continue
             if len(segments) > 1 and not _has_measured(slow):
                 text = f"none of its {segment.size} samples is finite; the phase was left out"
@@ -101,7 +102,7 @@ def records_of(
                 slow.breaks,
                 slow.pauses,
                 phase=name,
-                start_time=segment.start_time,
+                start_time=slow.start_time,
                 continues=kept,
                 truncated=not begins,
                 initial_voltage=float(before.channels["voltage"][-1]) if before and begins and not kept else None,
@@ -117,6 +118,8 @@ def records_of(
         before = segment
     if not records and unknown:
         raise RecordingError("holds no phase with a finite sample, expected voltages and displacements")
+    if not records and short:
+        raise RecordingError(f"`average`: got {options.average}, expected at most {max(short)} samples")
     if not records:
         raise RecordingError(f"holds only {IDLE} and {HOLD}, expected phases; `include` keeps those")
     origin = records[0].start_time

@@ -17,12 +17,12 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...record import Samples
-from .decimating_buffer import DecimatingBuffer
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -58,27 +58,38 @@ class Segment:
         return self.start_time + (self.size + missing) * self.sample_period
 
     def averaged(self, average: int) -> Segment:
-        """The segment with `average` samples averaged into one, not across gaps; the incomplete rest is dropped."""
+        """The segment with `average` samples averaged into one, not across gaps.
+
+        The incomplete rest before a gap is dropped; samples between two gaps can all be such a rest.
+        """
         if average == 1:
             return self
-        holes = sorted({**self.breaks, **self.pauses}.items())
-        edges = [0, *(at for at, _ in holes), self.size]
+        holes = {**self.breaks, **self.pauses}
+        edges = [0, *sorted(holes), self.size]
         starts = np.cumsum([0, *((b - a) // average for a, b in itertools.pairwise(edges))]).tolist()
-        moved = dict(zip([at for at, _ in holes], starts[1:], strict=False))
-        channels = {
-            name: np.concatenate([_averaged(values[a:b], average) for a, b in itertools.pairwise(edges)])
-            for name, values in self.channels.items()
-        }
+        moved = dict(zip(edges[1:-1], starts[1:-1], strict=True))
+        first = max((at for at in moved if not moved[at]), default=0)
+        ahead = first + sum(lost for at, lost in holes.items() if 0 < at <= first)
+
+        def after(places: Mapping[int, int]) -> dict[int, int]:
+            lost: dict[int, int] = {}
+            for at in (at for at in places if 0 < moved[at] < starts[-1]):
+                lost[moved[at]] = lost.get(moved[at], 0) + max(1, round(places[at] / average))
+            return lost
+
         return replace(
             self,
-            channels=channels,
+            channels={
+                name: np.concatenate([_averaged(values[a:b], average) for a, b in itertools.pairwise(edges)])
+                for name, values in self.channels.items()
+            },
             sample_period=self.sample_period * average,
-            breaks={moved[at]: max(1, round(lost / average)) for at, lost in self.breaks.items()},
-            pauses={moved[at]: max(1, round(lost / average)) for at, lost in self.pauses.items()},
+            start_time=self.start_time + ahead * self.sample_period,
+            lost=self.lost + ahead,
+            breaks=after(self.breaks),
+            pauses=after(self.pauses),
         )
 
 
 def _averaged(values: Samples, average: int) -> Samples:
-    buffer = DecimatingBuffer(1, average=average)
-    buffer.add_column(values)
-    return buffer.column(0)
+    return np.asarray(values[: values.size // average * average].reshape(-1, average).mean(axis=1))

@@ -122,6 +122,40 @@ def test_idle_and_hold_are_kept_where_named(whole):
     assert [r.continues for r in experiment] == [False, True, True, True, True]
 
 
+def test_a_phase_too_short_to_average_is_left_out(tmp_path):
+    with BagWriter(tmp_path / "bag") as bag:
+        driver = Driver(bag)
+        for number, name, blocks in ((1, "step", 1), (2, "triangle", 3)):
+            driver.phase(number, name)
+            driver.play(blocks)
+    experiment = read(tmp_path / "bag", average=2 * SIZE)
+    assert [r.phase for r in experiment] == ["triangle"]
+    assert [n.phase for n in experiment.notices if n.kind == "left_out"] == ["step"]
+    assert "averaged" not in kinds(experiment)
+    with pytest.raises(RecordingError, match=f"`average`: got {4 * SIZE}, expected at most {3 * SIZE} samples"):
+        read(tmp_path / "bag", average=4 * SIZE)
+
+
+@pytest.mark.parametrize("short", [0, 1, 2])
+def test_a_piece_between_gaps_that_is_too_short_to_average_is_dropped(tmp_path, short):
+    """The samples that are left keep their times, and the state after a gap is unknown."""
+    with BagWriter(tmp_path / "bag") as bag:
+        driver = Driver(bag)
+        driver.phase(1, "triangle")
+        for place in range(3):
+            driver.play(1 if place == short else 4)
+            driver.advance(driver.block())  # is lost
+    whole, slow = (read(tmp_path / "bag", average=n) for n in (1, 2 * SIZE))
+    kept = [r for r in whole if r.size == 4 * SIZE]
+    assert len(slow) == len(kept) == 2
+    for record, expected in zip(slow, kept, strict=True):
+        np.testing.assert_allclose(record.voltage, expected.decimate(2 * SIZE).voltage, rtol=1e-12)
+        assert record.time[0] - slow[0].time[0] == pytest.approx(
+            expected.time[0] - kept[0].time[0], abs=2 * SIZE * PERIOD
+        )
+        assert record.truncated
+
+
 def test_other_ros_software_opens_the_bag(whole):
     path, _ = whole
     with Reader(path) as reader:
