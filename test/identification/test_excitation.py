@@ -16,6 +16,7 @@
 
 import numpy as np
 import pytest
+import scipy.signal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -99,6 +100,20 @@ def test_noise_is_flat_in_its_band_and_empty_above():
     )
     assert low == pytest.approx(high, rel=0.1)
     assert power[frequency > 5200].sum() < 1e-3 * power.sum()
+
+
+@pytest.mark.parametrize("period", [1e-4, 2e-4, 5e-4, 4e-3])
+def test_every_drive_stays_below_the_highest_sine_that_the_sample_rate_allows(period):
+    """A drive near or above the Nyquist frequency appears at another frequency."""
+    limits = DriveLimits(sample_period=period)
+    waves = {
+        "chirp": excitation.chirp(limits, (20.0, 3000.0), 0.5, centre=0.5, amplitude=0.1),
+        "mixture": excitation.mixture(limits, 20.0, seed=1),
+    }
+    for name, wave in waves.items():
+        power = np.abs(np.fft.rfft((wave - wave.mean()) * scipy.signal.windows.tukey(wave.size, 0.1))) ** 2
+        frequency = np.fft.rfftfreq(wave.size)
+        assert power[frequency > 0.44].sum() < 1e-3 * power.sum(), name
 
 
 def test_odd_multisine_leaves_the_even_lines_empty():

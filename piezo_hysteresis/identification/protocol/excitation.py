@@ -27,6 +27,21 @@ import numpy as np
 
 from .drive_limits import DriveLimits, Samples
 
+HIGHEST = 0.2
+"""Highest frequency of noise and multisine as a share of the sample rate."""
+HIGHEST_SINE = 0.4
+"""Highest frequency of a sine, also of one whose frequency rises, as a share of the sample rate."""
+
+
+def possible_band(limits: DriveLimits, band: tuple[float, float], share: float) -> tuple[float, float]:
+    """Lowest and highest frequency [Hz] of a drive, lowered where they exceed this share of the sample rate.
+
+    >>> [possible_band(DriveLimits(1e-3), band, HIGHEST) for band in ((20.0, 3000.0), (1.0, 10.0))]
+    [(20.0, 200.0), (1.0, 10.0)]
+    """
+    highest = min(band[1], share / limits.sample_period)
+    return min(band[0], 0.1 * highest), highest
+
 
 def hold(limits: DriveLimits, level: float, duration: float) -> Samples:
     """Constant level [V] for `duration` [s]."""
@@ -100,10 +115,11 @@ def sine(
 
 
 def chirp(limits: DriveLimits, band: tuple[float, float], duration: float, centre: float, amplitude: float) -> Samples:
-    """Sine whose frequency rises exponentially through `band` [Hz] in `duration` [s]."""
+    """Sine whose frequency rises exponentially through `band` [Hz], as far as it is possible, in `duration` [s]."""
+    lowest, highest = possible_band(limits, band, HIGHEST_SINE)
     time = limits.sample_period * np.arange(limits.samples(duration) + 1)
-    rate = np.log(band[1] / band[0]) / duration
-    phase = 2.0 * np.pi * band[0] * np.expm1(rate * time) / rate
+    rate = np.log(highest / lowest) / duration
+    phase = 2.0 * np.pi * lowest * np.expm1(rate * time) / rate
     return limits.volts(centre + amplitude * np.sin(phase))
 
 
@@ -226,7 +242,8 @@ def mixture(limits: DriveLimits, duration: float, seed: int) -> Samples:
     turns = np.concatenate([[0.0], np.cumsum(random.uniform(0.05, 0.35, max(2, int(duration / 0.05))))])
     corners = random.uniform(0.2, 0.8, turns.size)
     wave = np.interp(time, turns, corners)
-    for frequency in np.exp(random.uniform(np.log(20.0), np.log(400.0), 2)):
+    lowest, highest = np.log(possible_band(limits, (20.0, 400.0), HIGHEST_SINE))
+    for frequency in np.exp(random.uniform(lowest, highest, 2)):
         start = random.uniform(0.0, 0.5) * duration
         wave += np.where(time >= start, 0.06 * np.sin(2.0 * np.pi * frequency * (time - start)), 0.0)
     wave += _fit(0.005 * _random_phase(limits, np.arange(1, max(2, count // 10)), count, seed), 0.02)

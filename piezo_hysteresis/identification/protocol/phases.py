@@ -27,8 +27,6 @@ from .drive_limits import DriveLimits, Samples
 
 CORNERED = 1e-4
 """Longest stored sample period [s] of loops with sharp turning points, because averaging flattens them."""
-HIGHEST = 0.2
-"""Highest frequency of noise and multisine as a share of the sample rate; sines reach twice that."""
 FEWEST = 4
 """Smallest number of samples of a noise phase: one period of one line."""
 
@@ -119,7 +117,7 @@ class Phases:
         """Band-limited noise of `rms` of the range; nothing if `duration` [s] has too few samples for one period."""
         if self.limits.samples(duration) < FEWEST:
             return
-        bandwidth = HIGHEST / self.limits.sample_period
+        bandwidth = excitation.HIGHEST / self.limits.sample_period
         seed = self.next_seed()
         self.add("noise", excitation.noise(self.limits, rms, bandwidth, duration, centre=0.35, seed=seed))
 
@@ -129,15 +127,14 @@ class Phases:
 
     def sines(self, *frequencies: float, slow_period: float) -> None:
         """One phase per frequency that the sample rate allows; up to 10 Hz it is stored at `slow_period` [s]."""
-        for frequency in (f for f in frequencies if f * self.limits.sample_period <= 2.0 * HIGHEST):
+        for frequency in (f for f in frequencies if f * self.limits.sample_period <= excitation.HIGHEST_SINE):
             duration = max(0.1, 3.0 / frequency) if frequency > 10.0 else 2.0 / frequency
             body = excitation.sine(self.limits, frequency, duration)
             self.add(f"sine_{frequency:g}hz", body, slow_period if frequency <= 10.0 else 0.0)
 
     def multisine(self, amplitude: float, fundamental: float = 20.0, highest: float = 2000.0) -> None:
         """Four periods of an odd multisine; both frequencies fall where the sample rate demands it."""
-        highest = min(highest, HIGHEST / self.limits.sample_period)
-        fundamental = min(fundamental, 0.1 * highest)
+        fundamental, highest = excitation.possible_band(self.limits, (fundamental, highest), excitation.HIGHEST)
         seed = self.next_seed()
         self.add("multisine", excitation.multisine(self.limits, fundamental, highest, amplitude, 4, 0.5, seed))
 
