@@ -83,8 +83,13 @@ def validate(experiment: Experiment, args: argparse.Namespace) -> int:
     Raises
     ------
     PiezoError
-        If the model or the records cannot be used, or do not fit each other.
+        On an option for one axis, or if the model or the records cannot be used, or do not fit each other.
     """
+    for option, is_given in (("--figures", args.figures is not None), ("--one-zero", args.one_zero)):
+        if is_given:
+            raise ParameterError(
+                f"{option}: got a model of several axes, expected a model of one axis; leave the option out"
+            )
     records: Sequence[Record] = experiment.records
     errors = axes_errors(axes_file.load(args.model), records)
     _show(errors, "", args.json)

@@ -151,6 +151,15 @@ def test_an_option_for_one_axis_is_refused_for_several(piezo, coupled, tmp_path,
     assert not (tmp_path / "m.npz").exists()
 
 
+@pytest.mark.parametrize("words", [("--figures", "drawn"), ("--one-zero",)])
+def test_an_option_to_validate_one_axis_is_refused_for_several(piezo, coupled, tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    assert piezo("identify", coupled, "-o", "m.npz", "--taps", 5).status == 0
+    line = refusal(piezo("validate", "m.npz", coupled, *words))
+    assert words[0] in line and "leave the option out" in line
+    assert not (tmp_path / "drawn").exists()
+
+
 def test_a_model_of_one_axis_gets_no_name_of_several(piezo, of_one_axis, tmp_path):
     t = PERIOD * np.arange(4000)
     u = 5.0 - 5.0 * np.cos(2.0 * np.pi * t)
