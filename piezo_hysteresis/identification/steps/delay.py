@@ -83,11 +83,6 @@ class Delay:
         """Delay [s]."""
         return self.samples * self.sample_period
 
-    @property
-    def is_resolved(self) -> bool:
-        """False if the response has reached half its height at its first sample: the delay is below one sample."""
-        return all(n.kind != "delay_unresolved" for n in self.notices)
-
     def __str__(self) -> str:
         first = self.onsets[0]
         span = f"{first.earliest * 1e6:.4g} to {first.latest * 1e6:.4g} µs"

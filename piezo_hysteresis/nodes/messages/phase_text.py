@@ -76,17 +76,3 @@ def phase_and_owner(text: str) -> tuple[str, str]:
     """
     name, _, owner = text.partition("@")
     return phase_name(name), owner
-
-
-def phase_from_text(text: str) -> tuple[int, str]:
-    """Number and name of a message of `phase`, ``"<number> <name>"``.
-
-    Raises
-    ------
-    RecordError
-        If the text has another form.
-    """
-    number, _, name = text.partition(" ")
-    if not (number.isascii() and number.isdigit() and name):
-        raise RecordError(f"phase: got {text[:80]!r}, expected '<number> <name>'")
-    return int(number), name

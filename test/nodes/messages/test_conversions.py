@@ -25,7 +25,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from piezo_hysteresis.errors import RecordError
 from piezo_hysteresis.nodes.messages import conversions
 from piezo_hysteresis.nodes.messages.cloud import to_cloud
-from piezo_hysteresis.nodes.messages.phase_text import phase_from_text, phase_name, phase_text
+from piezo_hysteresis.nodes.messages.phase_text import phase_name, phase_text
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -104,13 +104,6 @@ def test_a_stamp_with_a_second_of_nanoseconds_is_refused():
 def test_phase_names_that_could_not_name_a_file_are_refused(name):
     with pytest.raises(RecordError):
         phase_name(name)
-
-
-def test_phase_text_round_trip_and_refusal():
-    assert phase_from_text("12 sine_50hz") == (12, "sine_50hz")
-    for text in ("", "12", "x y", "-1 rest", "² rest"):
-        with pytest.raises(RecordError):
-            phase_from_text(text)
 
 
 def test_diagnostic_values_and_stamps():
