@@ -14,6 +14,8 @@
 
 """Waveforms stay inside the limits by construction, and hold what they promise."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -57,6 +59,14 @@ def test_every_protocol_respects_every_stage(limits, plan, seed):
         assert phase.largest_slew <= limits.max_slew_rate * (1 + 1e-6)
         rest = limits.samples(limits.rest)
         assert np.all(voltage[:rest] == limits.safe_voltage) and np.all(voltage[-rest:] == limits.safe_voltage)
+
+
+@pytest.mark.parametrize("plan", [protocol.short, protocol.rich])
+def test_the_time_of_a_protocol_is_stated_where_it_is_chosen(plan):
+    duration = f"{plan().summary.duration:.0f} s"
+    chosen = (Path(__file__).parents[2] / "config" / "identification.yaml").read_text(encoding="utf-8")
+    assert f"{plan.__name__} ({duration})" in chosen
+    assert f" {duration} " in plan.__doc__
 
 
 def test_the_rich_protocol_fits_the_published_stage():

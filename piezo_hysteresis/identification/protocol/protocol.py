@@ -121,7 +121,7 @@ def paper(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
 
 
 def short(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
-    """All phases that an identification needs, about 25 s of stage time; parameters as in `paper`."""
+    """All phases that an identification needs, 18 s of stage time on the default range; parameters as in `paper`."""
     plan = Phases(limits or DriveLimits(), seed)
     plan.conditioning()
     plan.rest(0.0, 0.2)
@@ -138,7 +138,7 @@ def short(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
 
 
 def rich(limits: DriveLimits | None = None, seed: int = 0) -> Protocol:
-    """Long protocol that shows every effect of the catalogue, about 175 s; parameters as in `paper`."""
+    """Long protocol that shows every effect of the catalogue, 159 s on the default range; parameters as in `paper`."""
     plan = Phases(limits or DriveLimits(), seed)
     limits = plan.limits
     slow, slowest = 1e-3, 1e-2
