@@ -140,15 +140,14 @@ def prepare(state: DiagnosisState) -> DiagnosisState:
 
 def _without_verdict(state: DiagnosisState) -> Diagnosis | None:
     """The answer "unknown" if the data are damaged; an IdentificationError if nothing moves in them."""
-    experiment, model = state.experiment, state.model
+    experiment = state.experiment
     if not any(moves(record) for record in experiment):
         raise IdentificationError("diagnose: the drive does not move in any record; expected loops, steps or noise")
-    severe = [n for n in experiment.notices if n.severe]
-    if not severe:
-        check_motion("diagnose", [experiment[i] for i in state.moving])
-        return None
-    reason = f"No verdict is possible, because of the data: {severe[0].message}."
-    return Diagnosis(Conclusion.INSUFFICIENT_DATA, reason, model, model, experiment)
+    for severe in filter(lambda notice: notice.severe, experiment.notices):
+        reason = f"No verdict is possible, because of the data: {severe.message}."
+        return Diagnosis(Conclusion.INSUFFICIENT_DATA, reason, state.model, state.model, experiment)
+    check_motion("diagnose", [experiment[i] for i in state.moving])
+    return None
 
 
 def _resampled(state: DiagnosisState) -> DiagnosisState:

@@ -114,9 +114,8 @@ class Diagnosis(Pictured):
         """Why an effect is not named that the search added."""
         if self.gap is not None and self.model is not None and name in self.model:
             return f"it is in the model but not named: the model explains {100 * self.gap.explained:.0f} % of the gap"
-        closed = f"{100 * selection.explained(selection.score):.0f} % of the gap"
-        closest = " with ".join(s.best.effect.public_name() for s in selection.accepted)
-        return f"the closest effect is {closest}, which explains only {closed}"
+        share, names = selection.explained(selection.score), [s.best.effect.public_name() for s in selection.accepted]
+        return f"the closest effect is {' with '.join(names)}, which explains only {100 * share:.0f} % of the gap"
 
     def effects(self) -> list[dict[str, Any]]:
         """The named effects, as in ``answer.json``."""

@@ -27,7 +27,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..blocks.block import Array
 from ..effects import ExtraResonance
 from ..errors import DivergenceError, PiezoError
 from ..identification.cores import start_helpers
@@ -48,7 +47,6 @@ from ..identification.training.joint_fit import LAST, joint
 from ..identification.training.model_score import score_model
 from ..identification.training.training_data import choose_test_records, training_data_of
 from ..model.model import Model
-from ..record import Record
 from .choice.next_experiment import best_next_experiment
 from .diagnosis import Diagnosis
 from .diagnosis_state import DiagnosisState
@@ -76,11 +74,10 @@ ONLY_A_LAG = (
 def diagnose_few(state: DiagnosisState) -> Diagnosis:
     """Extend the best model while cross-validation improves, and name the effects that are certain."""
     given, experiment = state.model, state.experiment
-    setup, model, found = _start(state)
-    several = has_several_drives(setup.records, setup.fitted)
+    setup, model, found, steps = _start(state)
     state.progress("location of the residual", 0.5)
     where = located(setup.baseline.model, setup.records, setup.fitted, setup.least, offset=True)
-    selection, fit, is_certain = _extended(state, setup, model, found, several)
+    selection, fit, is_certain = _extended(state, setup, model, found, steps)
     state.progress("gap", 0.9)
     first, final = given or setup.baseline.model, selection.model  # the gap of a given model is that before any refit
     gap = gap_between(first, final, setup, setup.tested, offset=True)
@@ -91,6 +88,7 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     shown = {s.best.effect.public_name() for s in selection.accepted}
     missing = missing_excitation(setup.records, setup.usable, shown)
     origin = CHOSEN if found else KEPT if fit is None else REFITTED
+    several = has_several_drives(setup.records, setup.fitted)
     said = conclusion_of_few(selection, is_certain, setup.score, gap, len(setup.usable), several, missing, origin)
     if said[0] is Conclusion.MISSING_EFFECT and given is None and ExtraResonance.name in shown:
         said = said[0], said[1] + ("" if roles_of(experiment).broadband else ONLY_A_LAG)
@@ -108,10 +106,11 @@ def diagnose_few(state: DiagnosisState) -> Diagnosis:
     )
 
 
-def _start(state: DiagnosisState) -> tuple[BaselineSetup, Model, Identification | None]:
+def _start(state: DiagnosisState) -> tuple[BaselineSetup, Model, Identification | None, list[Step]]:
     """The published or the given model, fitted jointly in the setup; the model to extend; and where it comes from.
 
-    The model to extend has the structure that predicts best, unless a model was given or the time was over before.
+    The model to extend has the structure that predicts best, unless a model was given or the time was over before. The
+    steps are the effects of this structure that are certain.
     """
     experiment, used, progress = state.experiment, state.moving, state.progress
     records = experiment.records
@@ -125,44 +124,38 @@ def _start(state: DiagnosisState) -> tuple[BaselineSetup, Model, Identification 
         with suppress(TimeSpentError), ending_at(state.end):
             found = identify(known, held_out=(), memory=True, progress=lambda w, f: progress(w, 0.2 + 0.3 * f))
     model, noise = found.model if found else published, noise_floors(records)
-    short, quiet, least = _short(records, noise)
+    short = shortened(records, SEARCHED)
+    quiet = noise_of_averages(noise, records, short)
+    least = floors(short, quiet)
     data = training_data_of(short, fitted, quiet, least, model)
     baseline = joint(with_zero(published), data, LAST, SHARP)
     score, lost = score_model(baseline.model, data, baseline.linearised), [np.zeros(r.size) for r in records]
     whole, span = floors(records, noise), experiment.range
+    steps = list[Step]()
     if score.excess > ADEQUATE:
         start_helpers()  # effects will be searched for
+        if found and has_several_drives(records, fitted):
+            steps = structure_steps(found, score, data, short, least.tolist(), fitted)
     setup = BaselineSetup(records, records, lost, noise, whole, span, used, fitted, aside, data, baseline, score)
-    return setup, model, found
-
-
-def _short(records: Sequence[Record], noise: Array) -> tuple[tuple[Record, ...], Array, Array]:
-    """The records of the search, their noise, and their floors [m]."""
-    short = shortened(records, SEARCHED)
-    quiet = noise_of_averages(noise, records, short)
-    return short, quiet, floors(short, quiet)
+    return setup, model, found, steps
 
 
 def _extended(
-    state: DiagnosisState, setup: BaselineSetup, model: Model, found: Identification | None, several: bool
+    state: DiagnosisState, setup: BaselineSetup, model: Model, found: Identification | None, steps: list[Step]
 ) -> tuple[Selection, Fit | None, bool]:
     """The effects of the structure and further ones, the fit of the saved model, and whether the structure is certain.
 
-    `several` says whether the records have several drives. There is no fit if a given model is saved.
+    There is no fit if a given model is saved.
     """
     data = setup.training_data
     now, score = (found.fit, score_model(model, data)) if found else (setup.baseline, setup.score)
-    steps: list[Step] = []
-    if found and setup.score.excess > ADEQUATE and several:
-        short, _, least = _short(setup.records, setup.noise)
-        steps = structure_steps(found, setup.score, data, short, least.tolist(), setup.fitted)
     is_certain = bool(steps)
     fitting = [e for e in state.effects if not (loop_is_off(now.model) and e.host == now.model.hysteresis.name)]
     with ending_at(state.end):
         more = select(now.model, data, score, fitting, lambda w, f: state.progress(w, 0.6 + 0.3 * f))
     extended = more.accepted[-1].best.fit if more.accepted else None
     contenders = [] if found else [now]
-    enough = len(setup.usable) >= FEWEST_RECORDS and several
+    enough = len(setup.usable) >= FEWEST_RECORDS and has_several_drives(setup.records, setup.fitted)
     if extended is not None and (enough or not is_certain):  # few records show no effect beside a certain one
         contenders.append(extended)
     best = _best(setup, model, found, contenders, LEADS if is_certain else EXTENDS)
