@@ -27,7 +27,7 @@ from ...errors import DivergenceError, IdentificationError, ParameterError
 from ...model.model import Model
 from ...model.parameter_covariance import ParameterCovariance
 from ...record import Record
-from .bounded_step import bounds_of, gauge, room_of
+from .bounded_step import bounds_of, gauge, projected, room_of
 from .covariance import covariance
 from .normal_equations import Gram, Linearised, Nuisance, grams, linearised_by, residuals
 from .stable_step import stable_step
@@ -183,12 +183,8 @@ def fit(
     iterations, small, converged, taken = 1, 0, False, True
     total = weighted(current, sizes)
     while iterations < max_iterations and not converged:
-        hessian = directions.T @ total[:-1, :-1] @ directions
-        slope = directions.T @ total[:-1, -1]
-        # for a parameter without influence, rounding may give a negative value
-        idle = np.diag(hessian) <= np.finfo(float).tiny
-        hessian[idle, :] = hessian[:, idle] = 0.0
-        diagonal = np.where(idle, 1.0, np.diag(hessian))
+        hessian, slope = projected(directions, total)
+        diagonal = np.where(np.diag(hessian) > 0.0, np.diag(hessian), 1.0)
         room = room_of(model, free, directions)
         while True:
             step = stable_step(model, free, directions, hessian + np.diag(damping * diagonal), slope, room)
