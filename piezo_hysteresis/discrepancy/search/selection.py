@@ -47,7 +47,7 @@ from .candidate_refits import (
 from .candidates import Candidate, FittedCandidate, screen
 from .earlier_effects import certain, in_best_laws
 from .refit import converged, without
-from .selection_result import Selection, Step
+from .selection_result import NAMED, Selection, Step, explained
 
 REFITS = 6
 """Number of candidates that are refitted jointly."""
@@ -82,7 +82,8 @@ def select(
     now, reached, data = model, score, training_data
     with suppress(TimeSpentError):
         while leaves_room(reached) and len(steps) < MOST:
-            step = _turn(now, data, reached, effects, report)
+            start = steps[0].before if steps else reached
+            step = _turn(now, data, reached, start, effects, report)
             if step is None:
                 break
             if not steps and (better := _better_without(step)) is not None:
@@ -103,7 +104,7 @@ def select(
 
 def _better_without(step: Step) -> Fitted | None:
     """The model refitted without a refused effect, if this lowers the cost: the baseline was in another minimum."""
-    if step.accepted or step.before.cost - step.best.score.cost < LEAST_GAIN:
+    if step.accepted or step.before.excess <= ADEQUATE or step.before.cost - step.best.score.cost < LEAST_GAIN:
         return None
     alone = without(step.best)
     return alone if alone is not None and step.before.cost - alone.score.cost >= LEAST_GAIN else None
@@ -113,6 +114,7 @@ def _turn(
     model: Model,
     training_data: TrainingData,
     before: Score,
+    start: Score,
     effects: Collection[type[Effect]],
     progress: Progress,
 ) -> Step | None:
@@ -123,7 +125,7 @@ def _turn(
     twins = {e.name: t.name for e in effects for t in model.effects if e.is_twin_of(t)}
     tried = [e for e in effects if e.public_name() not in present and e.name not in twins]
     screened = screen(model, training_data, tried, is_small=before.excess <= ADEQUATE)
-    refits, best, reason = _best_effect(model, screened, before, progress)
+    refits, best, reason = _best_effect(model, screened, before, start, progress)
     if best is None:
         return None
     reason = reason or _untried_twin(type(best.effect), effects)
@@ -150,7 +152,7 @@ def _turn(
 
 
 def _best_effect(
-    model: Model, screened: Sequence[Candidate], before: Score, progress: Progress
+    model: Model, screened: Sequence[Candidate], before: Score, start: Score, progress: Progress
 ) -> tuple[list[FittedCandidate], FittedCandidate | None, str | None]:
     """Refits of the best candidates, the best of them, and why its effect is rejected or None."""
     best: FittedCandidate | None = None
@@ -160,6 +162,10 @@ def _best_effect(
         first = [c for c in first if before.cost - c.score.cost >= LEAST_GAIN]
     refits = best_of_each(refit_candidates(model, first, before, progress))
     if refits:
+        share = explained(start.excess, refits[0].score.excess, refits[0].training_data.null)
+        if start.excess <= ADEQUATE and share < NAMED and not leaves_room(refits[0].score):  # none would follow
+            said = f"the error is at the floor, and {100 * share:.0f} % of what is above the noise is explained"
+            return refits, refits[0], said
         relatives = refits_of_relatives(screened, refits[0], before)
         refits = best_of_each([*refits, *relatives, *refits_of_creep(model, screened, refits[0])])
         best, reason = _judged(refits, before)

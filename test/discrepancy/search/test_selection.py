@@ -22,7 +22,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.discrepancy.search import earlier_effects
+from piezo_hysteresis.discrepancy.search import earlier_effects, selection
 from piezo_hysteresis.discrepancy.search.acceptance_tests import is_certain
 from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, leaves_room, refits_of_relatives
 from piezo_hysteresis.discrepancy.search.candidates import Candidate
@@ -117,6 +117,17 @@ def test_a_search_begins_again_from_the_model_that_was_refitted_without_a_refuse
     assert found.accepted == ()
     assert found.baseline is not start
     assert found.score.excess < ADEQUATE
+
+
+def test_what_explains_too_little_of_an_error_at_the_floor_for_a_name_is_not_fitted_further(monkeypatch):
+    """With less noise than its floor, the error that creep leaves is a misfit, which has no name."""
+    (step,) = steps_with((CREEP,), (CREEP.with_values(gamma=5e-4),))
+    before, data = step.before, step.best.training_data
+    assert before.cost > LEAST_GAIN and before.excess < ADEQUATE
+    monkeypatch.setattr(selection, "converged", None)
+    found = select(step.best.fit.model.without(CREEP.name), replace(data, noise=0.1 * data.floors), before, [Creep])
+    assert found.accepted == ()
+    assert "at the floor" in found.steps[0].rejected[CREEP.name]
 
 
 @pytest.mark.parametrize("hidden", [(CREEP,), (DRIFT, CREEP)])
