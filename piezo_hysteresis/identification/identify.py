@@ -205,7 +205,7 @@ def _fit_notices(fit: Fit, found: FitOutcome, roles: Roles, phases: Sequence[Pha
     """What a user should know about a fit before its model is used."""
     notices = [Notice("at_bound", f"{name} reached a bound of its range") for name in undetermined(fit)]
     if not fit.converged:
-        text = f"the joint fit did not converge in {fit.iterations} linearisations"
+        text = f"the joint fit stopped after {counted(fit.iterations, 'linearisation')}, before it had converged"
         notices.insert(0, Notice("not_converged", text))
     if found.structure is None:
         notices += [

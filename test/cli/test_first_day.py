@@ -236,7 +236,7 @@ def test_an_undetermined_fit_is_reported_with_status_1(tmp_path):
 
     fit = SimpleNamespace(converged=False, iterations=40, at_bounds=())
     said = verdict_line(SimpleNamespace(fit=fit, free_run_percent=5.0, notices=()))
-    assert said.startswith("Verdict: not determined. The fit did not converge in 40 linearisations")
+    assert said.startswith("Verdict: not determined. The fit stopped after 40 linearisations, before it had converged")
 
 
 def test_a_parameter_at_a_bound_has_no_interval_and_the_result_counts(tmp_path):

@@ -20,7 +20,7 @@ import argparse
 from typing import Any
 
 from ...effects import HYSTERESIS, OPERATORS, PublishedBoucWen
-from ...errors import ParameterError
+from ...errors import ParameterError, counted
 from ...identification.identification import Identification, undetermined
 from ...identification.identify import identify
 from ...identification.records.roles import HELD_OUT
@@ -124,8 +124,9 @@ def verdict_line(found: Identification) -> str:
     fit, percent = found.fit, found.free_run_percent
     if not fit.converged:
         return (
-            f"Verdict: not determined. The fit did not converge in {fit.iterations} linearisations, so the values "
-            "above are not estimates; give phases that move the stage over its range at several rates."
+            f"Verdict: not determined. The fit stopped after {counted(fit.iterations, 'linearisation')}, before it had "
+            "converged, so the values above are not estimates; give phases that move the stage over its range at "
+            "several rates."
         )
     severe = sum(n.severe for n in found.notices)
     caveat = (

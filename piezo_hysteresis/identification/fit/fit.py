@@ -63,7 +63,7 @@ class Fit:
     at_bounds : tuple of str
         Parameters that stopped at a bound of the parameter table.
     converged : bool
-        False if the iteration limit was reached first.
+        False if the fit stopped before: at the iteration limit, or because further steps or their derivatives diverge.
     iterations : int
         Number of linearisations.
     linearised : Linearised, optional
