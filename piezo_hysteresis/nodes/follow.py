@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Show the `status` topics of an axis in one line on the terminal until the running job ends."""
+"""Show in one line on the terminal what the identification node of an axis does, until its job ends."""
 
 from __future__ import annotations
 
@@ -21,59 +21,74 @@ from collections.abc import Sequence
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.clock import Clock, ClockType
 from rclpy.signals import SignalHandlerOptions
 
 from ..errors import printable
+from .identification.status import ENDED, SUFFIX
 from .messages.conversions import values_of
 from .runtime.executor import make_executor
 from .runtime.guarded_node import GuardedNode
-from .runtime.qos import LATCHED
+from .topics import subscribe
 
-ENDED = {"done": 0, "failed": 1, "aborted": 1, "refused": 1}
-"""Last states of a job, with the exit code for each."""
-
-_IDLE = ("idle", "")
-"""States in which no job is running."""
+_INTERVAL = 0.1
+"""Time between two looks at the newest status [s]; a late joiner first receives old ones."""
 
 _WIDTH = 110
 """Largest number of characters of a line; a longer line could not be overwritten."""
 
 
 class Follower(GuardedNode):
-    """Writes the newest status of an axis.
+    """Writes the newest status of the identification node of an axis.
 
     Parameters
     ----------
     namespace : str
         Namespace of the axis, e.g. ``/stage_x``.
+
+    Attributes
+    ----------
+    exit_status : int or None
+        None until a job ends that had not ended before; then 0 if it was done, and 1 if not.
     """
 
     def __init__(self, namespace: str) -> None:
         super().__init__("follow", namespace=namespace, start_parameter_services=False)
         self.exit_status: int | None = None
-        self._under_way = False
+        self._newest: DiagnosticStatus | None = None
+        self._ended_before: str | None = None
         self._line = ""
-        status = self.create_subscription(DiagnosticStatus, "status", self._on_status, LATCHED)  # the newest is enough
+        status = subscribe(self, "status", self._on_status)
+        self.create_timer(_INTERVAL, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._show(f"no message on {status.topic_name} yet; the identification node of this namespace has to run")
 
     def _on_status(self, status: DiagnosticStatus) -> None:
-        values = values_of(status)
-        state = values.get("state", "")
+        if status.name.endswith(SUFFIX):
+            self._newest = status
+
+    def _look(self) -> None:
+        """Show the newest status, and find out whether a job has ended since the first look."""
+        if self._newest is None:
+            return
+        values = values_of(self._newest)
+        state, goal = values.get("state", ""), values.get("goal", "")
         line = " ".join(
             part
             for part in (
-                f"{status.name.rpartition(': ')[0]}:",
+                f"{self._newest.name.removesuffix(SUFFIX)}:",
                 state,
                 values.get("phase", ""),
                 f"{values['percent']} %" if values.get("percent", "0") != "0" else "",
-                status.message,
+                self._newest.message,
             )
             if part
         )
         self._show(printable(line)[:_WIDTH])
-        if state in ENDED and self._under_way:
-            self.exit_status = ENDED[state]
-        self._under_way = self._under_way or state not in (*_IDLE, *ENDED)
+        has_ended = state in ENDED
+        if self._ended_before is None:
+            self._ended_before = goal if has_ended else ""
+        if has_ended and goal != self._ended_before:
+            self.exit_status = int(state != "done")
 
     def _show(self, line: str) -> None:
         """Overwrite the last line on a terminal; elsewhere write a line for each change."""

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
@@ -25,7 +26,12 @@ from ..messages.conversions import diagnostic, values_of
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
-from .protocol_runner import Progress
+
+if TYPE_CHECKING:
+    from .protocol_runner import Progress
+
+SUFFIX = ": identification"
+"""End of the name of its statuses; other nodes publish on `status`, too."""
 
 ENDED = ("done", "failed", "aborted")
 """States in which a job has ended."""
@@ -55,7 +61,7 @@ class IdentificationStatus:
 
     def __init__(self, node: GuardedNode) -> None:
         self._node = node
-        self._name = f"{node.get_fully_qualified_name().lstrip('/')}: identification"
+        self._name = f"{node.get_fully_qualified_name().lstrip('/')}{SUFFIX}"
         self._publisher = advertise(node, "status")
         self._diagnostics = advertise(node, DIAGNOSTICS)
         self.experiment = self.owner = self.goal = self.likely = ""

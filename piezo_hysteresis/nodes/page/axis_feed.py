@@ -28,6 +28,7 @@ from ...errors import PiezoError, printable
 from ...report.live.axis_state import AxisState, Status
 from ...report.live.controls import CONTROLS
 from ...report.live.source import Answer
+from ..identification.status import SUFFIX
 from ..messages.cloud_stream import CloudReader
 from ..messages.conversions import values_of
 from ..messages.samples import PREDICTED_SAMPLES, SampleReader
@@ -130,7 +131,7 @@ class AxisFeed:
         self.state.change = to_status(message)
 
     def _on_status(self, message: DiagnosticStatus) -> None:
-        if message.name.endswith(": identification"):
+        if message.name.endswith(SUFFIX):
             self.state.report_identification(to_status(message))
 
     def _on_recalibrations(self, message: String) -> None:
