@@ -56,9 +56,10 @@ def run(monkeypatch):
     return SimpleNamespace(driver=driver, runs=runs, job=runs._play("path", found))
 
 
-def block(begin, size):
+def block(begin, size, displacement=0.0):
     index = np.arange(begin, begin + size, dtype=np.uint32)
-    return SampleBlock(0, PERIOD * np.arange(size), np.zeros(size), np.zeros(size), index, np.ones(size, np.uint32))
+    measured = np.full(size, displacement)
+    return SampleBlock(0, PERIOD * np.arange(size), np.zeros(size), measured, index, np.ones(size, np.uint32))
 
 
 def advance(run, clock, seconds):
@@ -101,6 +102,31 @@ def test_a_path_that_goes_on_ends_with_its_last_sample(run, clock):
         advance(run, clock, 10.0)
         run.runs.tracking.take(block(begin, 100))
     with pytest.raises(StopIteration):
+        next(run.job)
+
+
+@pytest.mark.parametrize("lost", ["the last block", "the reading of the last sample"])
+def test_a_path_that_was_played_to_its_end_is_done_without_its_last_samples(run, lost):
+    """It waited for them, and the path failed with the question whether the driver was alive."""
+    next(run.job)
+    tracking = run.runs.tracking
+    tracking.take(block(0, SIZE - 10))
+    next(run.job)
+    if lost == "the last block":
+        run.driver.state = "done"
+        next(run.job)
+        tracking.take(block(SIZE, 10))
+    else:
+        tracking.take(block(SIZE - 10, 10, np.nan))
+    with pytest.raises(StopIteration):
+        next(run.job)
+    assert tracking.missing == 10 and np.array_equal(tracking.measured, np.zeros(SIZE))
+
+
+def test_a_path_without_a_reading_is_not_done(run):
+    next(run.job)
+    run.runs.tracking.take(block(0, SIZE, np.nan))
+    with pytest.raises(StageError, match="no displacement was measured"):
         next(run.job)
 
 

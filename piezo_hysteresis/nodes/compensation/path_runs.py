@@ -143,7 +143,7 @@ class PathRuns:
 
     def _report_result(self, name: str, tracking: Tracking) -> None:
         rms, expected = tracking.rms or 0.0, tracking.plan.expected.total
-        reason = f"{1e9 * rms:.1f} nm rms, expected {1e9 * expected:.1f} nm{doubts(tracking.plan)}"
+        reason = f"{_rms_text(rms, expected, tracking)}{doubts(tracking.plan)}"
         self._status.show("done", reason, name, first_index=tracking.path_index, rms=rms, expected=expected)
 
     def _play(
@@ -166,6 +166,8 @@ class PathRuns:
         before, limit, unheard = (False, 0), WaitLimit(_STARTED_WITHIN), WaitLimit(_HEARD_WITHIN)
         while not tracking.is_whole:
             state = self._driver.state
+            if state == "done" and tracking.has_passed:
+                break  # the last sample was lost
             if state != "sent":
                 unheard = WaitLimit(_HEARD_WITHIN)
             elif unheard.has_passed():
@@ -184,6 +186,8 @@ class PathRuns:
                     f"the driver is '{state}' and sends no samples of the drive for {longest:g} s; is it alive?"
                 )
             yield
+        if tracking.rms is None:
+            raise StageError("it was played, but no displacement was measured on the path; see the log of the driver")
         return tracking
 
     def rounds(self, name: str, applied: AppliedState, first: Plan, limits: Limits) -> Job:
@@ -224,7 +228,7 @@ class PathRuns:
             yield from rest()
             yield from in_thread(learning.update, tracking.measured, applied.state)
             now = learning.rounds[-1]
-            reason = f"round {number}: {1e9 * now.rms:.1f} nm rms, expected {1e9 * now.expected:.1f} nm"
+            reason = f"round {number}: {_rms_text(now.rms, now.expected, tracking)}"
             index = tracking.path_index
             self._status.show(
                 "learning", reason, f"{name}_{number}", first_index=index, rms=now.rms, expected=now.expected
@@ -237,3 +241,8 @@ class PathRuns:
             f"; {learning.reason}" if learning.reason else ""
         )
         self._status.show("done", reason, name, rms=last.rms, expected=last.expected, best=learning.best.rms)
+
+
+def _rms_text(rms: float, expected: float, tracking: Tracking) -> str:
+    missing = f"; {counted(tracking.missing, 'sample')} missing" if tracking.missing else ""
+    return f"{1e9 * rms:.1f} nm rms, expected {1e9 * expected:.1f} nm{missing}"

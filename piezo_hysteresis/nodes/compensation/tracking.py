@@ -44,6 +44,10 @@ class Tracking:
         """Wanted − measured displacement of the newest received sample of the path [m]; None before the first."""
         self.received = 0
         """Number of samples of the drive that have arrived; those that came twice count twice."""
+        self.is_whole = False
+        """Whether the last sample of the drive has arrived."""
+        self.has_passed = False
+        """Whether a sample after the drive has arrived."""
         self._squares, self._count = 0.0, 0
         self._measured = np.full(plan.voltage.size, np.nan)
         self._early: list[SampleBlock] = []
@@ -72,6 +76,8 @@ class Tracking:
             measured, known = block.displacement[a - begin : b - begin], self._measured[a:b]
             self._count_errors(a, np.where(np.isnan(known), measured, np.nan))
             known[:] = measured
+            self.is_whole = self.is_whole or b == self._measured.size
+        self.has_passed = self.has_passed or begin + block.size > self._measured.size
 
     def _count_errors(self, begin: int, new: Array) -> None:
         """Add the errors of new samples from drive sample `begin` on; those that are known already are NaN."""
@@ -84,9 +90,9 @@ class Tracking:
             self._squares, self._count = self._squares + float(errors @ errors), self._count + errors.size
 
     @property
-    def is_whole(self) -> bool:
-        """Whether the last sample of the drive has arrived."""
-        return bool(np.isfinite(self._measured[-1]))
+    def missing(self) -> int:
+        """Number of samples of the drive that were lost, or that are not finite."""
+        return int(np.count_nonzero(np.isnan(self._measured)))
 
     @property
     def measured(self) -> Array:
