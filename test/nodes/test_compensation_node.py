@@ -16,6 +16,7 @@
 
 import itertools
 import signal
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -243,6 +244,31 @@ def test_stop_takes_the_stage_to_its_safe_voltage(lab):
     assert node.ask("stop").success
     lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")
     node.until("scan", "stopped")
+
+
+def test_a_path_that_fails_while_it_is_played_leaves_the_stage_safe(lab):
+    """After an error of the node the driver played on, and nobody compared what the stage did with the path."""
+    code = (
+        "import sys; from piezo_hysteresis.nodes.compensation import path_runs; "
+        "left = iter(range(40, -1, -1)); path_runs.WaitLimit.has_passed = lambda limit: 1 // next(left) > 1; "
+        "from piezo_hysteresis.nodes.compensation.compensation_node import main; sys.exit(main())"
+    )
+    node, statuses = Compensation(lab, program=[sys.executable, "-c", code], fresh=True), lab.statuses()
+    node.send(scan(duration=20.0))
+    lab.wait(lambda: node.samples.newest.voltage[-1] > 1.0, "the scan to begin")
+    assert "the driver goes to its safe voltage" in node.until("scan", "failed").message
+    lab.wait(lambda: "stopped" in lab.states(statuses, "scan"), "the end of the drive")
+    lab.wait(lambda: abs(node.samples.newest.voltage[-1]) < 1e-3, "the safe voltage")
+
+
+def test_a_path_that_the_driver_refuses_does_not_stop_what_another_program_plays(lab):
+    node, statuses = Compensation(lab), lab.statuses()
+    lab.send(np.zeros(30_000), "foreign", PERIOD)
+    lab.wait(lambda: "playing" in lab.states(statuses, "foreign"), "the foreign waveform")
+    node.send(scan())
+    assert "'foreign' is being played" in node.until("scan", "refused").message
+    lab.wait(lambda: {"done", "stopped"} & {*lab.states(statuses, "foreign")}, "its end")
+    assert "stopped" not in lab.states(statuses, "foreign")
 
 
 @pytest.mark.parametrize("drives", ["a path", "a displacement that is held"])

@@ -51,7 +51,16 @@ def run(monkeypatch):
         voltage=drive, predicted=drive, wanted=drive, begin=0, sample_period=PERIOD, expected=expected
     )
     monkeypatch.setattr(path_runs, "described", lambda found, expected: "")
-    driver = SimpleNamespace(limits="any", missing="a driver", state="playing", first_index=0, send=lambda phase: None)
+    sent: list[str] = []
+    driver = SimpleNamespace(
+        limits="any",
+        missing="a driver",
+        state="playing",
+        first_index=0,
+        command_max_age=2.0,
+        sent=sent,
+        send=lambda phase: sent.append(phase.name),
+    )
     runs = path_runs.PathRuns(driver, SimpleNamespace(show=lambda *arguments, **named: None), {})
     return SimpleNamespace(driver=driver, runs=runs, job=runs._play("path", found))
 
@@ -103,6 +112,17 @@ def test_a_path_that_goes_on_ends_with_its_last_sample(run, clock):
         run.runs.tracking.take(block(begin, 100))
     with pytest.raises(StopIteration):
         next(run.job)
+
+
+@pytest.mark.parametrize(("age", "wait"), [(0.5, 3.0), (2.0, 3.0), (10.0, 11.0)])
+def test_a_path_is_sent_again_when_the_first_command_cannot_be_played_any_more(run, clock, age, wait):
+    """The driver played the first one, which was late, and the node knew of the second one only."""
+    run.driver.state, run.driver.command_max_age = "sent", age
+    next(run.job)
+    advance(run, clock, wait)
+    assert len(run.driver.sent) == 1
+    advance(run, clock, 0.5)
+    assert len(run.driver.sent) == 2
 
 
 @pytest.mark.parametrize("lost", ["the last block", "the reading of the last sample"])

@@ -49,6 +49,9 @@ from .settings import COMPENSATION
 from .status import ENDED, CompensationStatus
 from .trajectory import described, doubt, trajectory_from_cloud, trajectory_to_cloud, why_not
 
+_TO_SAFETY = "the driver goes to its safe voltage"
+"""Effect of a stop in a status."""
+
 
 class CompensationNode(GuardedNode):
     """Compensation of one axis: topics, services and parameters stand in docs/ros."""
@@ -176,10 +179,11 @@ class CompensationNode(GuardedNode):
         except StopIteration:
             self._finish()
         except Exception as error:
+            asked = self._driver.stop() if self._runs.is_driving else None
             self._finish()
             refused = isinstance(error, PathError) or self._driver.state == "refused"
             report = self._status.refuse if refused else self._status.failed
-            report(self._phase, reason_of(error))
+            report(self._phase, f"{reason_of(error)}; {_TO_SAFETY}" if asked else reason_of(error))
             if not isinstance(error, PiezoError):
                 raise
 
@@ -227,7 +231,7 @@ class CompensationNode(GuardedNode):
         self._set_point.leave()
         if self._job is not None:
             self._give_up()
-        effect = "the driver goes to its safe voltage" if asked else "there is no driver to stop"
+        effect = _TO_SAFETY if asked else "there is no driver to stop"
         self._status.show("stopped", f"on request; {effect}", ended)
         response.success = asked is not None
         response.message = f"stopped; {effect}" if asked else effect

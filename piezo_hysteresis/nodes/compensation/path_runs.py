@@ -37,7 +37,9 @@ from .trajectory import described, doubts, why_not
 _STARTED_WITHIN = 20.0
 """Longest wait for the driver to begin with a waveform, or for its last samples [s]."""
 _HEARD_WITHIN = 3.0
-"""Time after which a drive without an answer is sent again [s]: a driver that has just started may not hear it."""
+"""Shortest time after which a drive without an answer is sent again [s]: a new driver may not hear the first one."""
+_ANSWERED_WITHIN = 1.0
+"""Time for the answer to the oldest command that a driver plays [s]; after that it refuses the first one."""
 _REST = 0.01
 """Largest change of the drive of a stage at rest, as a share of its range."""
 
@@ -75,6 +77,11 @@ class PathRuns:
         self._driver, self._status, self._values = driver, status, values
         self.tracking: Tracking | None = None
         self.last: tuple[str, Plan] | None = None
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether the driver plays a drive of the running job, or may still begin with it."""
+        return self.tracking is not None and self._driver.state not in ("refused", "stopped", "done")
 
     def planned(self, applied: AppliedState, wanted: np.ndarray, limits: Limits, way_back: bool = True) -> Plan:
         """Plan of a path (n,) [m] that starts at the present state of the stage, which `applied` contains."""
@@ -163,15 +170,17 @@ class PathRuns:
         self._driver.send(drive)
         # a device that plays from its memory sends nothing before the end
         longest_silence = _STARTED_WITHIN + 2.0 * found.voltage.size * found.sample_period
-        before, limit, unheard = (False, 0), WaitLimit(_STARTED_WITHIN), WaitLimit(_HEARD_WITHIN)
+        heard_within = max(_HEARD_WITHIN, self._driver.command_max_age + _ANSWERED_WITHIN)
+        before, limit, unheard = (False, 0), WaitLimit(_STARTED_WITHIN), WaitLimit(heard_within)
         while not tracking.is_whole:
             state = self._driver.state
             if state == "done" and tracking.has_passed:
                 break  # the last sample was lost
             if state != "sent":
-                unheard = WaitLimit(_HEARD_WITHIN)
+                unheard = WaitLimit(heard_within)
             elif unheard.has_passed():
                 self._driver.send(drive)
+                unheard = WaitLimit(heard_within)
             if state in ("refused", "stopped"):
                 raise StageError(f"the driver {state} it: {self._driver.reason}")
             if self._driver.limits is None:

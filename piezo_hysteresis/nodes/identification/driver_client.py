@@ -78,6 +78,8 @@ class DriverClient:
         State of the last phase: ``sending``, ``sent``, ``accepted``, ``playing``, ``done``, ``refused`` or ``stopped``.
     first_index : int
         Index of its first sample, once it plays.
+    command_max_age : float
+        Largest age of a command that the driver plays [s].
     stopped : str
         Reason why the driver accepts no command; empty where it was not stopped.
     voltages : int
@@ -93,7 +95,7 @@ class DriverClient:
         self.limits: DriveLimits | None = None
         self.state = self.reason = self.stopped = ""
         self._refused_voltage, self._refused_at = "", -math.inf
-        self.first_index = self.voltages = 0
+        self.first_index, self.voltages, self.command_max_age = 0, 0, 0.0
         self.owner, self.holder = f"{node.get_name()}.{os.getpid()}", ""
         self._claims = advertise(node, "claim")
         self._is_claiming = self._has_owned = False
@@ -216,13 +218,15 @@ class DriverClient:
             self.limits = None
             return
         self._asked = time.monotonic()
-        self._pending = self._parameters.get_parameters([f"in_force.{name}" for name in (*_NAMES, "stopped")])
+        in_force = (f"in_force.{name}" for name in (*_NAMES, "stopped"))
+        self._pending = self._parameters.get_parameters([*in_force, "command_max_age"])
         self._pending.add_done_callback(self._node.guarded(self._on_limits))
 
     def _on_limits(self, answer: Future) -> None:
         if answer.cancelled():
             return
         values = [parameter_value_to_python(value) for value in answer.result().values]
+        self.command_max_age = (values.pop() if len(values) > 1 + len(_NAMES) else None) or 0.0
         stopped = values.pop() if len(values) > len(_NAMES) else False
         self.stopped = f"the driver was stopped and moves nothing; call {self._driver}/release first" if stopped else ""
         self.limits, self._answered = None, time.monotonic()

@@ -57,6 +57,10 @@ def link(shared_lab):
     return link
 
 
+def test_the_client_knows_how_long_the_driver_can_play_a_late_command(link):
+    assert link.command_max_age == MAX_AGE
+
+
 def test_packing_a_long_waveform_blocks_no_callback_and_keeps_it_valid(shared_lab, link):
     lab = shared_lab
     samples = lab.samples()
