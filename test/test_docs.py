@@ -30,6 +30,8 @@ from pathlib import Path
 
 import pytest
 
+from piezo_hysteresis.report.live.controls import CONTROLS
+
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
@@ -188,3 +190,8 @@ def test_notebooks_use_existing_names(page):
             if isinstance(node, ast.ImportFrom) and node.module.startswith("piezo_hysteresis"):
                 module = importlib.import_module(node.module)
                 assert all(hasattr(module, alias.name) for alias in node.names)
+
+
+def test_the_page_about_security_names_every_button():
+    (listed,) = re.findall(r"no more\s+\(([^)]*)\)", (ROOT / "docs" / "security.md").read_text())
+    assert [button.replace("take a ", "take ") for button in listed.split(", ")] == [c.name.lower() for c in CONTROLS]
