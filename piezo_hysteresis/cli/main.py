@@ -14,8 +14,8 @@
 
 """`piezo`: one command for everything that needs no ROS.
 
-Exit status: 0 done, also for every verdict of ``piezo diagnose``; 1 if data that were read do not determine the result,
-or it cannot be trusted; 2 for bad input, which cannot be read or used.
+Exit status: 0 done, also for every verdict of ``piezo diagnose``; 1 if the result cannot be trusted, is incomplete or
+missing; 2 for bad input, which cannot be read or used.
 """
 
 from __future__ import annotations
@@ -122,8 +122,8 @@ def _parser(chosen: str | None) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="piezo",
         description="Identify models of piezo stages, check them, and find missing physical effects.",
-        epilog="exit status: 0 success, 1 if the result cannot be trusted or the data do not determine it (the last "
-        "line says why; not after a verdict of `piezo diagnose`), 2 for bad input",
+        epilog="exit status: 0 success, also for every verdict of `piezo diagnose`; 1 if the result cannot be trusted, "
+        "is incomplete or missing (the last line says why); 2 for bad input",
     )
     parser.add_argument("--version", action="version", version=f"piezo_hysteresis {__version__}")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)

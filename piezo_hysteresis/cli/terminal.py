@@ -39,6 +39,8 @@ BREAKS = re.compile(r"(?<=[…,;]) ")
 """Places inside a cell of numbers where a line may end."""
 SPACE = re.compile(r"\s+")
 """Places inside a text where a line may end."""
+SEVERE = "Severe findings above: check the recording before you use it."
+"""Last line after severe findings in the data."""
 LINE_INTERVAL = 10.0
 """Time between two lines of progress in a file [s]."""
 

@@ -235,6 +235,7 @@ def test_a_diagnosis_of_data_that_allow_no_verdict_exits_with_1(piezo, files, tm
     assert done.status == 1
     assert "No verdict is possible, because of the data" in done.out
     assert page.exists()
+    assert done.out.splitlines()[-1] == "Severe findings above: check the recording before you use it."
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,9 @@ from ...report.tables.plan_table import answer, notes, plan_table
 from ..options.destination import add_results, require_new_results
 from ..terminal import console, show
 
+UNREACHABLE = "A part of the path cannot be reached."
+"""Beginning of the last line after a path that cannot be followed."""
+
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the subcommand."""
@@ -134,11 +137,14 @@ def run(args: argparse.Namespace) -> int:
     for line in notes(found):
         out.print(line)
     if not found.reachability.is_whole and not args.allow_partial:
-        out.print("no command was written; change the path, or give --allow-partial to write what the limits allow")
+        out.print(f"{UNREACHABLE} No command was written; change the path, or write what is allowed: --allow-partial")
         return 1
     _save(found, in_home(args.output))
     out.print(f"wrote {args.output}")
-    return 0 if found.reachability.is_whole else 1
+    if not found.reachability.is_whole:
+        out.print(UNREACHABLE)
+        return 1
+    return 0
 
 
 def _save(found: Plan, place: Path) -> None:

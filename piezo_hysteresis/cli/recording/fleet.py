@@ -104,18 +104,21 @@ def run(args: argparse.Namespace) -> int:
     if not args.urls and args.report is None:
         raise ParameterError("fleet: got no URL and no --report, expected recordings or the page to write")
     folder = in_home(args.output)
-    without = _worked(args, folder) if args.urls else 0
+    missing = _worked(args, folder) if args.urls else ""
     if args.report is not None:
         from ...fleet.table.results_history import results_history
         from ...report.fleet.fleet_page import fleet_page
 
         fleet_page(results_history(folder, args.task)).save(in_home(args.report))
         console().print(f"wrote {args.report}")
-    return 1 if without else 0
+    if missing:
+        console().print(missing)
+        return 1
+    return 0
 
 
-def _worked(args: argparse.Namespace, folder: Path) -> int:
-    """Process the recordings; returns those without a result."""
+def _worked(args: argparse.Namespace, folder: Path) -> str:
+    """Process the recordings; returns how many have no result, or nothing."""
     model = "" if args.model is None else model_file.dumps(model_file.load(args.model))
     work = work_for(args.task, model, args.hysteresis)
     reading = reading_options.keywords(args)
@@ -132,10 +135,9 @@ def _worked(args: argparse.Namespace, folder: Path) -> int:
             ):
                 out.print(run_fleet(orders, results, client, report_progress).sentence())
         without = sum(results.known[work.name, source.url].status != RowStatus.DONE for source in sources)
-    if without:
-        out.print(f"without a result: {without} of {len(sources)}; the column `error` of the table gives the reason")
     out.print(f"wrote {folder}")
-    return without
+    missing = f"without a result: {without} of {len(sources)}; the column `error` of the table gives the reason"
+    return missing if without else ""
 
 
 def _workers(client: Any) -> str:

@@ -43,6 +43,11 @@ def test_a_folder_of_recordings(piezo, folder, tmp_path):
     drawn = piezo("fleet", "-o", tmp_path / "results", "--task", "validate", "--report", page)
     assert drawn.status == 0, drawn.err
     assert "1 of 1 recordings have a result" in page.read_text()
+    (tmp_path / "lab" / "stage_y").mkdir()
+    (tmp_path / "lab" / "stage_y" / "broken.csv").write_text("time_s,voltage_V,displacement_m\n0,1,x\n")
+    broken = piezo(*command, "--workers", 1, "--report", page, "--force")
+    assert broken.status == 1
+    assert broken.out.splitlines()[-1].startswith("without a result: 1 of 2"), "the reason of the status"
 
 
 @pytest.mark.parametrize(
