@@ -26,6 +26,8 @@ POLICY = Path(__file__).parents[1] / "config" / "sros2_policy.xml"
 """Access control for one axis."""
 NODES = ("driver", "model", "identification", "compensation")
 """Nodes of the package that publish at all times."""
+PAGE = "page"
+"""Key of the node that only subscribes and calls services."""
 RECORDERS = ("identification", "operator")
 """Keys that may take every topic of an axis."""
 OF_JOBS = ("claimed_by", "model", "status")
@@ -52,7 +54,7 @@ def quality(topic: Topic) -> str:
 
 def may(key: str, right: str) -> list[str]:
     """Names that a key of the policy may publish, or subscribe to."""
-    names = list(OF_ROS[right]) if key in NODES or right == "publish" else []
+    names = list(OF_ROS[right]) if key in (*NODES, PAGE) or right == "publish" else []
     if right == "subscribe" and key in RECORDERS:
         names.append("*")  # by a pattern: Fast DDS exchanges no long permissions
     for topic in TOPICS.values():

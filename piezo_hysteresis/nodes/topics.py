@@ -114,12 +114,12 @@ TOPICS: dict[str, Topic] = {
     for topic in (
         Topic(
             "samples", PointCloud2, SAMPLES, "V, m, s", "one block per `block_duration` (10 ms)", "driver",
-            readers=("driver", "model", "compensation"),
+            readers=("driver", "model", "compensation", "page"),
         ),
         Topic("voltage", Float64, COMMAND, "V", "`live_rate` (50 Hz)", "driver", readers=("compensation",)),
         Topic("displacement", Float64, COMMAND, "m", "`live_rate`", "driver"),
         Topic("live", JointState, COMMAND, "V, m", "`live_rate`", "driver"),
-        Topic("phase", String, LATCHED, "", "at every change", "driver"),
+        Topic("phase", String, LATCHED, "", "at every change", "driver", readers=("page",)),
         Topic(
             "command", PointCloud2, COMMAND, "V", "", ANYONE, senders=("identification", "compensation"),
             readers=("driver",),
@@ -135,23 +135,29 @@ TOPICS: dict[str, Topic] = {
             "command_status", DiagnosticStatus, COMMAND_STATUS, "", "at every event", "driver",
             readers=("compensation",),
         ),
-        Topic("predicted_samples", PointCloud2, SAMPLES, "m, s", "as `samples`", "model"),
+        Topic("predicted_samples", PointCloud2, SAMPLES, "m, s", "as `samples`", "model", readers=("page",)),
         Topic("prediction", Float64, COMMAND, "m", "`live_rate`", "model"),
         Topic("residual", Float64, COMMAND, "m", "`live_rate`", "model"),
-        Topic("residual_rms", Float64, COMMAND, "m", "`live_rate`", "model"),
+        Topic("residual_rms", Float64, COMMAND, "m", "`live_rate`", "model", readers=("page",)),
         Topic("predicted_live", JointState, COMMAND, "V, m", "`live_rate`", "model"),
-        Topic("change", DiagnosticStatus, COMMAND, "", "1 Hz, and at every alarm", "model"),
-        Topic("recalibrations", String, LATCHED, "", "at every recalibration", "model"),
+        Topic("change", DiagnosticStatus, COMMAND, "", "1 Hz, and at every alarm", "model", readers=("page",)),
+        Topic("recalibrations", String, LATCHED, "", "at every recalibration", "model", readers=("page",)),
         Topic(
             "recalibrated_model", String, COMMAND, "", "at every recalibration", "model", readers=("identification",)
         ),
-        Topic("model", String, LATCHED, "", "at every new model", "identification", readers=("model", "compensation")),
-        Topic("status", DiagnosticStatus, STATUS, "", "at every step", "identification", senders=("compensation",)),
+        Topic(
+            "model", String, LATCHED, "", "at every new model", "identification",
+            readers=("model", "compensation", "page"),
+        ),
+        Topic(
+            "status", DiagnosticStatus, STATUS, "", "at every step", "identification", senders=("compensation",),
+            readers=("page",),
+        ),
         Topic("trajectory", PointCloud2, COMMAND, "m, s", "", ANYONE, readers=("compensation",)),
         Topic("set_displacement", Float64, COMMAND, "m", "", ANYONE, readers=("compensation",)),
         Topic("tracking_error", Float64, COMMAND, "m", "50 Hz while a trajectory plays", "compensation"),
         Topic("tracking_rms", Float64, COMMAND, "m", "50 Hz while a trajectory plays", "compensation"),
-        Topic(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), "", "1 Hz", ALL, readers=("driver",)),
+        Topic(DIAGNOSTICS, DiagnosticArray, QoSProfile(depth=10), "", "1 Hz", ALL, readers=("driver", "page")),
     )
 }  # fmt: skip
 """Topics of an axis by name, in the order of the docs."""

@@ -36,7 +36,7 @@ NODES = {
     "identification": "identification_node",
     "compensation": "compensation_node",
 }
-ALL_NODES = (*NODES.values(), "driver_node_stop")
+ALL_NODES = (*NODES.values(), "driver_node_stop", "page_node")
 OF_ROS = {"/rosout", "/parameter_events", "/clock"}
 
 
@@ -56,6 +56,7 @@ def nodes(shared_lab):
     shared_lab.driver()
     for executable in ("model_node", "identification_node", "compensation_node"):
         shared_lab.start(executable)
+    shared_lab.start("page_node", port=0, axes="/")
     there = shared_lab.node.get_node_names
     last = {
         "driver_node": "/samples",
@@ -187,7 +188,7 @@ def test_the_policy_grants_the_actions_to_the_nodes_that_serve_them_and_to_the_p
 
 def test_comments_of_the_policy_do_not_disturb_sros2():
     whole = ElementTree.parse(POLICY, ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True)))
-    assert [e.tag for e in whole.getroot().find("enclaves")] == ["enclave"] * 7
+    assert [e.tag for e in whole.getroot().find("enclaves")] == ["enclave"] * 8
 
 
 def test_the_policy_has_keys_for_operator_and_observer():
