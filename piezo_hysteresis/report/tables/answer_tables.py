@@ -37,8 +37,9 @@ def effect_table(answer: Mapping[str, Any]) -> Table | None:
         rows += [(effect["name"], effect["family"], share, twins, *cells) for cells in _cells(effect["parameters"])]
     header = ("effect", "family", "share of the gap", "confusable with", "parameter", "value", "95 %")
     several = len({row[0] for row in rows}) > 1
-    note = "The share is the decrease of the error above the noise floor, of which the squares are subtracted." + (
-        " It is that of all these effects together." if several else ""
+    note = (
+        "The share is 1 − √((V_after − 1)/(V_before − 1)), where V is the mean of (error/floor)² over the records."
+        + (" It is that of all these effects together." if several else "")
     )
     return Table("Effects found", header, tuple(rows), note, frozenset({2, 5, 6})) if rows else None
 
