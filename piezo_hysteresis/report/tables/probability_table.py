@@ -54,7 +54,7 @@ def probability_table(live: Mapping[str, Any]) -> Table:
     header = ("stage time [s]", "played", *(f"{name.replace('_', ' ')} [%]" for name in names))
     numeric = frozenset({0, *range(2, 2 + len(names))})
     caption = (
-        f"{live['reason']} None of these means an effect that the catalogue does not contain; after names, one more "
-        "beside them."
+        f"{live['reason']} “None of these” is an effect that the catalogue does not contain. “creep + none of these” "
+        "is creep and one such effect."
     )
     return Table("Probability of each explanation", header, rows, caption, numeric)
