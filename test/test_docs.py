@@ -30,6 +30,8 @@ from pathlib import Path
 
 import pytest
 
+import piezo_hysteresis
+from piezo_hysteresis import export
 from piezo_hysteresis.report.live.controls import CONTROLS
 
 ROOT = Path(__file__).parents[1]
@@ -195,3 +197,10 @@ def test_notebooks_use_existing_names(page):
 def test_the_page_about_security_names_every_button():
     (listed,) = re.findall(r"no more\s+\(([^)]*)\)", (ROOT / "docs" / "security.md").read_text())
     assert [button.replace("take a ", "take ") for button in listed.split(", ")] == [c.name.lower() for c in CONTROLS]
+
+
+def test_the_page_of_the_interface_lists_every_public_name():
+    listed = re.findall(r"^\.\. auto\w+:: (\S+)\.(\w+)$", (ROOT / "docs" / "api.md").read_text(), re.MULTILINE)
+    assert all(hasattr(importlib.import_module(module), word) for module, word in listed)
+    results = {"Identification", "Diagnosis"}
+    assert sorted(word for _, word in listed) == sorted({*piezo_hysteresis.__all__, *export.__all__, *results})
