@@ -29,7 +29,7 @@ ENOUGH = 1.5
 """Mean square of error over noise floor up to which nothing is missing."""
 
 HEADLINES = {
-    "missing_effect": "Missing effect: {names}",
+    "missing_effect": "Missing effect{s}: {names}",
     "changed_parameter": "A parameter of the model has changed: {names}",
     "nothing_missing": "Nothing is missing beyond the noise",
     "nothing_changed": "No change beyond the known error of the model is visible since it was identified",
@@ -38,7 +38,8 @@ HEADLINES = {
     "unexplained_gap": "Something is missing, but these data do not determine what it is",
     "": "No effect is named",
 }
-"""Headline of every conclusion in the answer of a diagnosis; the last one is for "unknown" in older files."""
+"""Headline of every conclusion in the answer of a diagnosis, with the names of the effects and the s of a plural; the
+last one is for "unknown" in older files."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,8 +133,7 @@ def _headline(answer: Mapping[str, Any]) -> str:
     effects = answer.get("effects", ())
     names = " and ".join(effect["name"].replace("_", " ") for effect in effects)
     conclusion = answer.get("conclusion") or _conclusion(answer)
-    headline = HEADLINES.get(conclusion, HEADLINES[""]).format(names=names)
-    return headline.replace("Missing effect:", "Missing effects:") if len(effects) > 1 else headline
+    return HEADLINES.get(conclusion, HEADLINES[""]).format(names=names, s="s" * (len(effects) > 1))
 
 
 def _conclusion(answer: Mapping[str, Any]) -> str:

@@ -167,8 +167,8 @@ def test_the_conclusion_alone_decides_on_the_headline(answer, conclusion):
     """Whatever the sentence of the reason is."""
     stated = {**answer, "verdict": str(conclusion.verdict), "conclusion": str(conclusion), "reason": "No verdict."}
     headline = answer_verdict(stated).headline
-    assert headline == HEADLINES[conclusion].format(names="creep")
-    assert [word for word, text in HEADLINES.items() if text.format(names="creep") == headline] == [conclusion]
+    assert headline == HEADLINES[conclusion].format(names="creep", s="")
+    assert [word for word, text in HEADLINES.items() if text.format(names="creep", s="") == headline] == [conclusion]
 
 
 def test_without_a_diagnosis_the_verdict_gives_error_floor_and_worst_phase(comparison):
