@@ -208,6 +208,5 @@ def compared_with_given(found: Diagnosis) -> Diagnosis:
     """
     unchanged = any(n.kind == UNCHANGED_STAGE for n in found.experiment.notices)
     if unchanged and found.verdict is Verdict.UNKNOWN and found.conclusion is not Conclusion.TIME_LIMIT:
-        before = found.reason.replace("Something is missing that", "What it has missed since then is something that", 1)
-        return replace(found, conclusion=Conclusion.NOTHING_CHANGED, reason=f"{AS_GOOD} {before}")
+        return replace(found, conclusion=Conclusion.NOTHING_CHANGED, reason=f"{AS_GOOD} {found.reason}")
     return found

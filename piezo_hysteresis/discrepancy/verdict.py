@@ -156,7 +156,7 @@ def unnamed_conclusion(selection: Selection, falls: bool, gap: Gap) -> tuple[Con
         reason = first.rejected.get(first.best.name)
         why = f" ({reason})" if reason else ""
         message = f"; the closest effect is {closest}, which explains {share:.0f} % of the gap{why}"
-    return Conclusion.UNEXPLAINED_GAP, f"Something is missing that no effect of the catalogue explains{message}."
+    return Conclusion.UNEXPLAINED_GAP, f"No effect is named: no effect of the catalogue explains the gap{message}."
 
 
 def conclusion_of_few(

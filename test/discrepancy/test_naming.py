@@ -116,6 +116,7 @@ def test_an_effect_outside_the_catalogue_is_unknown():
     assert found.verdict is Verdict.UNKNOWN
     assert found.effects() == []
     assert "no effect of the catalogue explains" in found.reason
+    assert "Something is missing" not in found.reason, "it also stands below the headline that no change is visible"
 
 
 def test_an_effect_that_only_test_records_show_is_not_ignored():
