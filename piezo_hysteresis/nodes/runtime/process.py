@@ -61,7 +61,7 @@ class NodeLife(Generic[AnyNode]):
     begin : callable
         Called once, before the node spins.
     end : callable
-        Called once, after it has stopped spinning for any reason.
+        Called once, after it has stopped spinning for any reason, or when a later node could not be made.
     """
 
     make: Callable[[], AnyNode]
@@ -105,31 +105,30 @@ def run_together(lives: Sequence[NodeLife[Any]], arguments: Sequence[str] | None
 
 
 def _run(lives: Sequence[NodeLife[Any]], arguments: Sequence[str] | None) -> int:
-    try:
-        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-        nodes = [(life.make(), life) for life in lives]
-        stop = _signalled()
-        if was_interrupted():
-            raise KeyboardInterrupt
-    except KeyboardInterrupt:
-        rclpy.try_shutdown()
-        return 128 + signal.SIGINT
-    except _BAD_START as error:
-        sys.stderr.write(f"{' '.join(str(error).split())}\n")
-        rclpy.try_shutdown()
-        return 2
-    gc.collect()
-    gc.freeze()  # the garbage collector need not walk over the objects of the start while a stream waits
-    executor = make_executor()
     with ExitStack() as ending:
         ending.callback(rclpy.try_shutdown)
-        ending.callback(executor.shutdown)
-        for node, life in nodes:
-            executor.add_node(node)
-            ending.callback(life.end, node)
-        for node, life in nodes:
+        nodes: list[GuardedNode] = []
+        try:
+            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+            executor = make_executor()
+            ending.callback(executor.shutdown)
+            for life in lives:
+                nodes.append(life.make())
+                ending.callback(life.end, nodes[-1])
+                executor.add_node(nodes[-1])
+            stop = _signalled()
+            if was_interrupted():
+                raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            return 128 + signal.SIGINT
+        except _BAD_START as error:
+            sys.stderr.write(f"{' '.join(str(error).split())}\n")
+            return 2
+        gc.collect()
+        gc.freeze()  # the garbage collector need not walk over the objects of the start while a stream waits
+        for node, life in zip(nodes, lives, strict=True):
             life.begin(node)
-        spin_until(executor, stop, nodes[0][0])
+        spin_until(executor, stop, nodes[0])
     return 0
 
 

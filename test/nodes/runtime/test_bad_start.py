@@ -15,6 +15,8 @@
 """A node that cannot start says why in one line, and its exit status is 2."""
 
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -37,3 +39,27 @@ def test_a_bad_argument_is_refused_in_one_line(lab, monkeypatch, executable, arg
     assert node.wait() == 2
     (line,) = (line for line in node.output.splitlines() if "compiling kernels" not in line)
     assert reason in line
+
+
+@pytest.mark.parametrize(("error", "status"), [("PiezoError('no model')", 2), ("KeyboardInterrupt", 130)])
+def test_the_nodes_before_one_that_cannot_start_are_ended(error, status):
+    """Their threads and locks; the last one first, while they can still publish."""
+    program = f"""
+import sys
+from piezo_hysteresis.errors import PiezoError
+from piezo_hysteresis.nodes.runtime.guarded_node import GuardedNode
+from piezo_hysteresis.nodes.runtime.process import NodeLife, run_together
+
+def fails():
+    raise {error}
+
+def end(node):
+    print(node.get_name(), node.context.ok())
+
+lives = [NodeLife(lambda name=name: GuardedNode(name), end=end) for name in ("first", "second")]
+sys.exit(run_together([*lives, NodeLife(fails, end=end)]))
+"""
+    ended = subprocess.run([sys.executable, "-c", program], timeout=60.0, capture_output=True, text=True, check=False)
+    assert ended.returncode == status, ended.stderr
+    assert ended.stderr == ("no model\n" if status == 2 else "")
+    assert ended.stdout.splitlines() == ["second True", "first True"]
