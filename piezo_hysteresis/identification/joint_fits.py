@@ -188,13 +188,17 @@ def fit_structured_broadband(published: FitOutcome, given: FitInput, orders: tup
     dynamics = BroadbandPart(start, records, given.roles.broadband, highest)
     choice = choose_structure(start, records, quiet, fitted, report, dynamics.fit, dynamics.fit)
     whole = score_left_out(choice.fit.model, records, quiet, fitted)
-    errors = f"{np.exp(0.5 * alone):.3g} and {np.exp(0.5 * whole):.3g} times the noise floor"
-    said = f"prediction errors of hysteresis with ARX dynamics alone, and of the structure chosen, are {errors}"
+    said = (
+        "on data left out of the fit, hysteresis with ARX dynamics has an error of "
+        f"{np.exp(0.5 * alone):.3g} times the noise floor, and the structure chosen from all others one of "
+        f"{np.exp(0.5 * whole):.3g}; "
+    )
     margin = LEADS if MEMORY.name in choice.fit.model else -LEADS
     if not whole < alone + margin:
-        return replace(published, notices=(*published.notices, Notice("structure", f"{said}, so they are used alone")))
+        return replace(published, notices=(*published.notices, Notice("structure", f"{said}the first is kept")))
+    said += "the second is used"
     if not whole < alone:
-        said += "; plays are preferred up to a small difference, because they stay inside the largest measured loop"
+        said += ": plays are preferred up to a small difference, because they stay inside the largest measured loop"
     fit, notices = given.gauge.of_fit(choice.fit), published.notices
     if form_of(fit.model)[2] != form_of(start)[2]:
         notices = tuple(n for n in notices if n.kind != "order_reduced")

@@ -14,6 +14,8 @@
 
 """The structure beside a noise record, for a creeping stage of relays, which plays and operator only approximate."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -92,6 +94,12 @@ def test_other_drives_are_predicted_better_than_by_hysteresis_and_dynamics_alone
 
 def test_the_fit_ends_where_no_play_leaves_its_bound_any_more(found):
     assert found.fit.converged
+
+
+def test_the_message_says_whose_error_is_smaller_and_which_is_used(found):
+    (said,) = (n.message for n in found.notices if n.message.startswith("on data left out"))
+    first, second = (float(number) for number in re.findall(r"of ([0-9.]+)(?: times|;)", said))
+    assert second < first and said.endswith("; the second is used")
 
 
 def test_the_dynamics_hold_the_mode_that_the_noise_shows(found):

@@ -122,7 +122,7 @@ def _other_state(model: Model, experiment: Experiment) -> tuple[Notice, ...]:
     if driven is model:
         return ()
     (notice,), left = rest_notices(driven), check_stage(driven, experiment.records).percent
-    message = f"{notice.message}; begun there, the model leaves {left:.3g} % of the range"
+    message = f"{notice.message}; begun in that state, the model leaves {left:.3g} % of the range"
     return (Notice(notice.kind, message),)
 
 

@@ -168,7 +168,9 @@ def _frequency(pole: complex, model: Model) -> float:
 def _alike(line: float, model: Model) -> str:
     """What is said of the alias of a line [Hz]."""
     alias = 1.0 / model.sample_period - line
-    return f"; a mode at {alias:.4g} Hz would ring alike in samples every {model.sample_period:.3g} s"
+    return (
+        f"; a mode at {alias:.4g} Hz would give the same samples at this period of {model.sample_period:.3g} s (alias)"
+    )
 
 
 def _damping(pole: complex) -> float:

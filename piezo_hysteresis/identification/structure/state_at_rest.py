@@ -161,12 +161,12 @@ def rest_notices(model: Model) -> list[Notice]:
     term = model.hysteresis.start_term
     if term is not None and term.name in model:
         h0 = ", ".join(f"{value:.3g}" for value in model[term.name].free_values())
-        where = f"the state of {model.hysteresis.name} at rest is {h0}"
+        drive = f"driven before: the state of {model.hysteresis.name} at rest is {h0}"
     elif MEMORY.name in model and (turns := model[MEMORY.name].array("turns")).size:
-        where = f"its plays at rest are as after {' and '.join(f'{model.voltage_scale * v:.4g} V' for v in turns)}"
+        drive = f"driven before to {' and then to '.join(f'{model.voltage_scale * v:.4g} V' for v in turns)}"
     else:
         return []
-    return [Notice("state_at_rest", f"the records begin as those of a stage that was driven before: {where}")]
+    return [Notice("state_at_rest", f"the records begin as those of a stage that was {drive}")]
 
 
 def lead_of_state(fit: PieceFit, pieces: Sequence[RecordPiece], floors: Sequence[float]) -> dict[str, float]:

@@ -48,5 +48,5 @@ def test_the_state_before_the_record_is_named_where_it_is_the_cause(turns, tmp_p
         assert not found
     else:
         (message,) = found
-        assert "as after 10 V and 0 V" in message
+        assert "driven before to 10 V and then to 0 V" in message
         assert float(message.split("leaves ")[1].split(" %")[0]) < 0.1 < said["percent_of_range"]
