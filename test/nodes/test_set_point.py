@@ -23,6 +23,7 @@ import pytest
 
 from piezo_hysteresis.compensation import Limits
 from piezo_hysteresis.effects import Arx, BoucWen, Offset
+from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.nodes.compensation.set_point import SetPoint, volts_per_metre
 
@@ -161,3 +162,8 @@ def test_the_slope_is_that_of_the_model(p2: float) -> None:
     ends = [float(model.run(np.full(2000, u), model.rest(u))[0][-1]) for u in (0.0, 10.0)]
     assert volts_per_metre(model, Limits(0.0, 10.0)) == pytest.approx(10.0 / (ends[1] - ends[0]), rel=1e-9)
     assert np.sign(volts_per_metre(model, Limits(0.0, 10.0))) == np.sign(p2)
+
+
+def test_a_model_that_rests_at_one_displacement_is_refused() -> None:
+    with pytest.raises(ModelError, match=r"got 1 µm at rest at 0 V and at 10 V, .* identify again"):
+        volts_per_metre(Model((BoucWen(), Arx(b=(0.0,)), Offset(y0=1e-6)), 2e-5, 10.0, 1e-5), Limits(0.0, 10.0))

@@ -134,11 +134,11 @@ class CompensationNode(GuardedNode):
             found = self._runs.planned(applied, np.full(16, target), limits, way_back=False)
             if not found.reachability.is_whole:
                 raise StageError(why_not(found))
+            slope = volts_per_metre(applied.model, limits)
         except PiezoError as error:
             self._status.refuse("set_displacement", str(error))
             return
         voltage = float(found.voltage[-1])
-        slope = volts_per_metre(applied.model, limits)
         self._set_point.go(target, voltage, slope, limits, in_motion=not applied.is_held)
         self._status.show("set", f"{1e6 * target:.6g} µm by {voltage:.6g} V{doubt(found)}", "set_displacement")
 

@@ -25,6 +25,7 @@ import numpy as np
 from std_msgs.msg import Float64
 
 from ...compensation import Limits
+from ...errors import ModelError
 from ...model.model import Model
 from ..identification.driver_client import DriverClient
 from ..runtime.sending import send
@@ -36,9 +37,20 @@ _TURNS_WITHIN = 0.5
 
 
 def volts_per_metre(model: Model, limits: Limits) -> float:
-    """Voltage for a displacement, of a stage that rests at one limit and then at the other [V/m]."""
+    """Voltage for a displacement, of a stage that rests at one limit and then at the other [V/m].
+
+    Raises
+    ------
+    ModelError
+        If the model rests at one displacement at both limits.
+    """
     ends = limits.voltage_min, limits.voltage_max
     low, high = (float(model.run([voltage], model.rest(voltage))[0][0]) for voltage in ends)
+    if low == high:
+        raise ModelError(
+            f"model: got {1e6 * low:.4g} µm at rest at {ends[0]:g} V and at {ends[1]:g} V, expected a displacement "
+            "that follows the voltage; identify again"
+        )
     return (ends[1] - ends[0]) / (high - low)
 
 
