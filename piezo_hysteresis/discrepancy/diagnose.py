@@ -115,13 +115,7 @@ def diagnose(
     # diverging trials have a large cost
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"), using_cores(cores):
         state = prepare(state)
-        try:
-            return _begun(compared_with_given(_without_verdict(state) or _answer(_resampled(state))))
-        except IdentificationError as error:  # of the model that the diagnosis begins with
-            message = str(error)
-            if not message.startswith("identify:"):
-                raise
-            raise IdentificationError("diagnose" + message.removeprefix("identify")) from error
+        return _begun(compared_with_given(_without_verdict(state) or _answer(_resampled(state))))
 
 
 def _begun(found: Diagnosis) -> Diagnosis:

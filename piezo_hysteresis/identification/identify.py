@@ -182,15 +182,14 @@ def _range_of_motion(records: Sequence[Record], roles: Roles) -> float:
     """Range of the displacement [m]; an error if drive or displacement do not move, or not for long enough."""
     moving = [records[i].size for i in roles.fitted if roles.contents[i].span > 0.0]
     if not moving:
-        raise IdentificationError("identify: the drive does not move in any record; expected loops, steps or noise")
+        raise IdentificationError("the drive does not move in any record; expected loops, steps or noise")
     if max(moving) < FEWEST_SAMPLES:
         raise IdentificationError(
-            f"identify: got {counted(max(moving), 'sample')} in the longest record that moves, "
-            f"expected {FEWEST_SAMPLES} or more"
+            f"got {counted(max(moving), 'sample')} in the longest record that moves, expected {FEWEST_SAMPLES} or more"
         )
     reach = max(float(np.ptp(r.displacement)) for r in records)
     if reach == 0.0:
-        raise IdentificationError("identify: the displacement never changes; expected that of a stage that is driven")
+        raise IdentificationError("the displacement never changes; expected that of a stage that is driven")
     return reach
 
 

@@ -317,8 +317,8 @@ def test_creep_continues_from_phase_to_phase():
     assert low <= 0.015 <= high
 
 
-def test_an_error_of_a_diagnosis_begins_with_its_own_name():
+def test_an_error_of_a_diagnosis_names_no_other_command():
     """The model that a diagnosis begins with is identified, and the error was that of another command."""
     wave = np.sin(0.5 * np.arange(24))
-    with pytest.raises(IdentificationError, match=r"^diagnose: got 24 samples"):
+    with pytest.raises(IdentificationError, match=r"^got 24 samples"):
         diagnose(Experiment((Record(wave, 1e-6 * wave, 1e-3, "sine_10hz"),)))
