@@ -44,7 +44,8 @@ def rows() -> Iterator[tuple[str, ...]]:
     """Cells of the table of topics."""
     for topic in TOPICS.values():
         kind = topic.type_name.replace("/msg/", "/")
-        yield f"`{topic.name}`", kind, topic.unit, quality(topic), topic.rate, topic.by
+        by = topic.by if topic.by == ANYONE else ", ".join((topic.by, *topic.senders))
+        yield f"`{topic.name}`", kind, topic.unit, quality(topic), topic.rate, by
 
 
 def quality(topic: Topic) -> str:

@@ -103,7 +103,9 @@ DRIVER: tuple[Row, ...] = (
         "time without a heartbeat after which the keeper brings a device to its safe voltage; 0: no keeper",
         _SOURCE,
     ),
-    Setting("frame_id", "", "frame of the displacement in all headers; empty: the namespace, without one 'stage'"),
+    Setting(
+        "frame_id", "", "frame of the displacement in all headers; empty: the namespace, or 'stage' if there is none"
+    ),
     Parameter("discovery_time", "T_d", "s", 0.5, 0.0, 30.0, "wait for another driver of the same topics", _SOURCE),
 )
 """Parameters of the driver. The parameters of a back end have the prefix ``"<word>."``."""
