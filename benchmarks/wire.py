@@ -102,7 +102,12 @@ class WiredSession:
         _SESSIONS.append(self)
 
     def start(self) -> None:
-        self.acquisition = self.session.start(time.time_ns, self.deliveries.append, self.failures.append, lambda: 1)
+        self.acquisition = self.session.start(
+            node_clock=time.time_ns,
+            deliver=self.deliveries.append,
+            fail=self.failures.append,
+            subscribers=lambda: 1,
+        )
 
     @property
     def wire(self) -> np.ndarray:

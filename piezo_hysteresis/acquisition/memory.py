@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import time
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
@@ -36,20 +36,13 @@ class MemoryAcquisition(StreamingAcquisition):
 
     The device plays a block to its end unless it is stopped. A ramp to a set-point that arrives meanwhile begins at the
     end of the block; a waveform that arrives meanwhile is refused.
-
-    Parameters
-    ----------
-    rest_period : float
-        Time between readings while a voltage is held [s].
     """
 
+    rest_period = 0.02
+    """Time between readings while a voltage is held [s]."""
     _poll = 0.01
-
-    def __init__(self, *arguments: Any, rest_period: float, **named: Any) -> None:
-        super().__init__(*arguments, **named)
-        self._rest_period = rest_period
-        self._given = False
-        self._next_target: float | None = None
+    _given = False
+    _next_target: float | None = None
 
     def ramp_to(self, voltage: float) -> None:
         """See `Playback.ramp_to`; while the device plays a block, the ramp begins at the end of that block."""
@@ -86,7 +79,7 @@ class MemoryAcquisition(StreamingAcquisition):
             self._rest(playback)
 
     def _rest(self, playback: Playback) -> None:
-        due = time.monotonic() + self._rest_period
+        due = time.monotonic() + self.rest_period
         while time.monotonic() < due:
             if not self._wait_until(min(due, time.monotonic() + self._poll)):
                 return

@@ -66,7 +66,9 @@ def record_phases(
         If the stage fails, or refuses a phase.
     """
     delivered: queue.SimpleQueue[Delivery | PiezoError] = queue.SimpleQueue()
-    acquisition = session.start(time.time_ns, delivered.put, delivered.put, lambda: 1)
+    acquisition = session.start(
+        node_clock=time.time_ns, deliver=delivered.put, fail=delivered.put, subscribers=lambda: 1
+    )
     records: list[Record] = []
     try:
         while acquisition.playback.is_stopping:  # from the voltage at which another program has left the stage

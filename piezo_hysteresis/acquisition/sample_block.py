@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ..stage.stage import Acquired, Samples
 from .drive import Event
+from .time_base import LATEST_STAMP
 
 _COLUMNS = ("time", "voltage", "displacement", "index", "phase")
 """Arrays that every block has."""
@@ -171,7 +172,8 @@ class Tally:
     clock_jumps: float = 0.0
     clock_drift: float = 0.0
 
-    def count(self, samples: int, never_measured: int) -> None:
-        """Count a block of samples, and those that were not measured before it."""
-        self.samples, self.blocks = self.samples + samples, self.blocks + 1
+    def count(self, block: SampleBlock, never_measured: int) -> None:
+        """Count a block, and the samples that were not measured before it."""
+        self.samples, self.blocks = self.samples + block.size, self.blocks + 1
+        self.undated += block.stamp == LATEST_STAMP
         self.never_measured += never_measured

@@ -110,6 +110,7 @@ class DriverSession:
 
     def start(
         self,
+        *,
         node_clock: Callable[[], int],
         deliver: Callable[[Delivery], None],
         fail: Callable[[PiezoError], None],
@@ -132,22 +133,20 @@ class DriverSession:
             self.stage.safe()  # no waveform may begin there
         settings = self.settings
         wanted = self._values.get("subscribers", 0)
-        arguments = (
+        acquisition = (StreamingAcquisition if self.limits.streaming else MemoryAcquisition)(
             self.stage,
             self._source(self.stage),
             TimeBase(self.sample_period, settings.real_time_factor),
             settings.block_size(self.sample_period),
-            node_clock,
-            deliver,
-            fail,
-            lambda: subscribers() >= wanted,
-            self.latch,
-            self._keeper,
+            node_clock=node_clock,
+            deliver=deliver,
+            fail=fail,
+            ready=lambda: subscribers() >= wanted,
+            latch=self.latch,
+            keeper=self._keeper,
         )
-        if self.limits.streaming:
-            acquisition = StreamingAcquisition(*arguments)
-        else:
-            acquisition = MemoryAcquisition(*arguments, rest_period=1 / settings.live_rate)
+        if isinstance(acquisition, MemoryAcquisition):
+            acquisition.rest_period = 1 / settings.live_rate
         _STREAMING.add(self)
         self._acquisition = acquisition  # before the thread, so that an interrupt between the two cannot forget it
         acquisition.start()

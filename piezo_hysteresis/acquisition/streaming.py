@@ -30,7 +30,7 @@ from .recorded_playback import Source
 from .safety.keeper_link import KeeperLink, NoKeeper
 from .safety.stop_latch import StopLatch
 from .sample_block import Delivery, SampleBlock, Tally
-from .time_base import LATEST_STAMP, TimeBase, read_together
+from .time_base import TimeBase, read_together
 
 
 class StreamingAcquisition:
@@ -69,6 +69,7 @@ class StreamingAcquisition:
         playback: Source,
         time_base: TimeBase,
         block_size: int,
+        *,
         node_clock: Callable[[], int],
         deliver: Callable[[Delivery], None],
         fail: Callable[[PiezoError], None],
@@ -249,8 +250,7 @@ class StreamingAcquisition:
         self.tally.clock_jumps += abs(self._time_base.follow(first, *read_together(self._node_clock)))
         stamp, period = self._time_base.stamp(first), self._time_base.sample_period
         block = SampleBlock.acquired(acquired, drive.phase, stamp, period, first, follows_gap=first > self.index)
-        self.tally.undated += stamp == LATEST_STAMP
-        self.tally.count(block.size, first - self.index)
+        self.tally.count(block, first - self.index)
         self.index = first + block.size
         self._open.follow(drive.events)
         if not self._is_abandoned:

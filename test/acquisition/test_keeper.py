@@ -87,7 +87,7 @@ import json, sys, time
 from benchmarks.wire import DriverSession, settings
 word, parameters, changes = json.loads(sys.argv[1])
 session = DriverSession(settings(word, **changes), parameters, "place")
-session.start(time.time_ns, lambda block: None, print, lambda: 1).ramp_to(3.0)
+session.start(node_clock=time.time_ns, deliver=lambda block: None, fail=print, subscribers=lambda: 1).ramp_to(3.0)
 time.sleep(100.0)
 """
 
@@ -104,7 +104,7 @@ def test_a_new_driver_waits_until_the_keeper_of_a_killed_one_has_ended():
         # without a keeper of its own: a busy machine would let it end this process, which is the driver here
         session = DriverSession(settings(name, **SLOW | {"keeper_timeout": 0.0}), parameters, "place")
         assert session.stage.voltage == 0.0
-        session.start(time.time_ns, lambda block: None, print, lambda: 1)
+        session.start(node_clock=time.time_ns, deliver=lambda block: None, fail=print, subscribers=lambda: 1)
         time.sleep(0.2)
         session.close()
         check_wire(amplifier.wire)

@@ -236,7 +236,7 @@ def test_a_call_that_does_not_return_is_left_to_the_keeper(kept, monkeypatch):
             s.session.close()
         assert callers == []
         with pytest.raises(StageError, match="still uses the stage"):
-            s.session.start(time.time_ns, s.deliveries.append, s.failures.append, lambda: 1)
+            s.start()
         with pytest.raises(StageError, match="is held by process"):
             WiredSession(name, parameters, amplifier)
         if kept:
@@ -270,7 +270,9 @@ def test_a_replay_that_waits_for_subscribers_ends_at_once():
     given = values("replay", experiment="recording", subscribers=1)
     session = DriverSession(settings("replay", sample_period=0.0), given, "test replay", lambda path: (record,))
     failures = []
-    acquisition = session.start(time.time_ns, lambda delivery: None, failures.append, lambda: 0)
+    acquisition = session.start(
+        node_clock=time.time_ns, deliver=lambda delivery: None, fail=failures.append, subscribers=lambda: 0
+    )
     session.close()
     assert not acquisition.is_running
     assert not failures

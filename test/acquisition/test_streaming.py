@@ -66,12 +66,14 @@ class Listener:
 def made(stage, kind=StreamingAcquisition, rate=10.0, clock=time.time_ns, **named):
     listener = Listener()
     playback = Playback(stage.voltage, 0.0, PERIOD, RAMP_RATE)
-    acquisition = kind(stage, playback, TimeBase(PERIOD, rate), 100, clock, listener.deliver, listener.fail, **named)
+    named |= {"node_clock": clock, "deliver": listener.deliver, "fail": listener.fail}
+    acquisition = kind(stage, playback, TimeBase(PERIOD, rate), 100, **named)
     return acquisition, listener
 
 
-def started(stage, kind=StreamingAcquisition, **named):
+def started(stage, kind=StreamingAcquisition, rest_period=0.02, **named):
     acquisition, listener = made(stage, kind, **named)
+    acquisition.rest_period = rest_period  # of a stage with memory
     acquisition.start()
     listener.wait(lambda heard: heard.deliveries or heard.failures)
     return acquisition, listener

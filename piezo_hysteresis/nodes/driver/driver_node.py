@@ -122,7 +122,10 @@ class DriverNode(GuardedNode, LifecycleNode):
         topics.restart()
         try:
             acquisition = session.start(
-                lambda: now(self), topics.deliver, lambda error: self._fail(session, error), lambda: topics.subscribers
+                node_clock=lambda: now(self),
+                deliver=topics.deliver,
+                fail=lambda error: self._fail(session, error),
+                subscribers=lambda: topics.subscribers,
             )
         except Exception as error:
             self._report_failure(error)

@@ -138,7 +138,8 @@ def test_a_label_lies_on_the_drive_of_its_phase(opened, lead, io_delay):
             done.set()
 
     playback = Playback(0.0, 0.0, TS, 1e6)
-    acquisition = StreamingAcquisition(stage, playback, TimeBase(TS), 300, time.time_ns, deliver, failures.append)
+    reports = {"node_clock": time.time_ns, "deliver": deliver, "fail": failures.append}
+    acquisition = StreamingAcquisition(stage, playback, TimeBase(TS), 300, **reports)
     wave = WAVE + 1.0
     phase = acquisition.play(wave, "wave", 1, lambda wave, voltage: None, lambda phase, size: None)
     acquisition.start()
