@@ -184,23 +184,28 @@ class ChangeReporter:
     def _is_predicting(self) -> bool:
         return time.monotonic() - self._predicted < _LONGEST_SILENCE
 
-    def _publish(self) -> None:
-        watch, change = self.watch, self.watch.change
-        values: dict[str, object] = {"alarms": watch.alarms, "statistic": change.statistic}
-        level, message = DiagnosticStatus.STALE, "no baseline; call ~/baseline while the stage is known to be good"
+    def _hindrance(self) -> tuple[bytes, str]:
+        """Level and reason where no samples are compared with a baseline; OK and no reason where they are."""
+        watch = self.watch
         if self._problem:
-            level, message = DiagnosticStatus.WARN, self._problem
-        elif not self._is_predicting and (watch.is_taking or watch.baseline is not None):
-            message = "no prediction; are driver and model there?"
-        elif watch.is_taking:
-            message = "taking the baseline"
-        elif watch.baseline is not None and watch.blind:
-            message = watch.blind
-        elif watch.baseline is not None and not watch.since:
-            level, message = DiagnosticStatus.OK, "no change since the baseline"
-        elif watch.since:
+            return DiagnosticStatus.WARN, self._problem
+        if watch.baseline is None and not watch.is_taking:
+            return DiagnosticStatus.STALE, "no baseline; call ~/baseline while the stage is known to be good"
+        if not self._is_predicting:
+            return DiagnosticStatus.STALE, "no prediction; are driver and model there?"
+        if watch.is_taking:
+            return DiagnosticStatus.STALE, "taking the baseline"
+        return DiagnosticStatus.STALE if watch.blind else DiagnosticStatus.OK, watch.blind
+
+    def _publish(self) -> None:
+        watch = self.watch
+        change = watch.compared if watch.since else watch.change  # an alarm remains, whatever blinds the watch
+        values: dict[str, object] = {"alarms": watch.alarms, "statistic": change.statistic}
+        level, hindrance = self._hindrance()
+        message = hindrance or "no change since the baseline"
+        if watch.since:
             level = DiagnosticStatus.ERROR if change.statistic > STRONG else DiagnosticStatus.WARN
-            message = f"the stage has changed: {' or '.join(change.groups) or 'group unknown'}"
+            message = f"the stage has changed: {' or '.join(change.groups)}{f'; {hindrance}' if hindrance else ''}"
         if change.groups:
             unit = UNITS[GROUPS.index(change.groups[0])]
             reach = 2.0 * change.deviation

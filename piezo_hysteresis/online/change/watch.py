@@ -56,6 +56,8 @@ class ChangeWatch:
     ----------
     change : Change
         Result of the detector for the newest score.
+    compared : Change
+        The newest result with a statistic; unlike `change`, it remains while the watch is blind.
     since : int
         Stamp at which the present change began [ns]; 0 while there is none.
     groups : tuple of str
@@ -83,7 +85,7 @@ class ChangeWatch:
             raise ParameterError(f"false_alarm_interval: got {false_alarm_interval:g} s, expected a time above 0 s")
         self._interval = false_alarm_interval
         self.baseline = baseline
-        self.change, self.since, self.alarms = Change(), 0, 0
+        self.change, self.compared, self.since, self.alarms = Change(), Change(), 0, 0
         self.groups: tuple[str, ...] = ()
         self._best = (0, 0.0)
         self.blind = _ZERO
@@ -186,6 +188,7 @@ class ChangeWatch:
         if self._detector is not None:
             self.change = self._detector.add(score)
             is_compared = bool(self.change.groups)
+            self.compared = self.change if is_compared else self.compared
             self.blind = "" if is_compared else _ZERO if self.change.watched else _OTHER_DRIVE
             if self.change.statistic > 1.0 and not self.since:
                 self.since, self.alarms = self.change.onset, self.alarms + 1
