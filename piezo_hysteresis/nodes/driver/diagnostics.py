@@ -24,7 +24,7 @@ from rclpy.clock import Clock, ClockType
 from ...acquisition.claim import Claim
 from ...acquisition.safety.stop_latch import StopLatch
 from ...acquisition.streaming import StreamingAcquisition
-from ..messages.conversions import diagnostic, to_stamp
+from ..messages.conversions import diagnostic, to_stamp, worst
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
@@ -87,7 +87,7 @@ class DriverDiagnostics:
         if self._latch.is_set and level == DiagnosticStatus.OK:
             level, message = DiagnosticStatus.WARN, f"stopped, {message}; nothing moves until ~/release"
         if fault := self._node.recent_fault:
-            level, message = max(level, DiagnosticStatus.WARN), f"{message}; {fault}"
+            level, message = worst(level, DiagnosticStatus.WARN), f"{message}; {fault}"
         acquisition = self._acquisition
         if acquisition is not None:
             tally, now = acquisition.tally, time.monotonic()

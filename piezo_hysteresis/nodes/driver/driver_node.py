@@ -152,7 +152,7 @@ class DriverNode(GuardedNode, LifecycleNode):
             return TransitionCallbackReturn.ERROR
         where = "" if session is not None and session.limits.ignores_drive else ": the stage is at its safe voltage"
         self.get_logger().info(f"not active any more{where}")
-        self._diagnostics.state(DiagnosticStatus.OK, "configured, not active")
+        self._diagnostics.state(DiagnosticStatus.OK, "configured, not active", session.limits.name if session else "")
         return done
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -20,7 +20,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 
@@ -75,7 +75,7 @@ def _gives_sign_of_life(node: Node) -> bool:
         publishers = node.get_publishers_info_by_topic("samples")
         names = {status_name(f"{one.node_namespace.rstrip('/')}/{one.node_name}") for one in publishers}
         # a driver without a stage reports that, too; it may have the name of the one that was killed
-        signs.extend(one for one in array.status if one.name in names and one.level < DiagnosticStatus.ERROR)
+        signs.extend(one for one in array.status if one.name in names and one.hardware_id)
 
     subscriptions = [
         node.create_subscription(PointCloud2, "samples", signs.append, SAMPLES),

@@ -30,6 +30,9 @@ from .phase_text import PHASE_FIELD, phase_text
 _END_OF_TIME = 2**31 * 1_000_000_000
 """Messages count seconds in 32 bits, and this time [ns] is the first one that does not fit."""
 
+_SEVERITY = (DiagnosticStatus.OK, DiagnosticStatus.STALE, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
+"""Levels from good to bad. The number of STALE is the largest, although it only says that nothing is known."""
+
 Samples = NDArray[np.float64]
 
 COMMAND = {"time": "f8", "voltage": "f8"}
@@ -107,6 +110,15 @@ def diagnostic(level: bytes, name: str, message: str, hardware_id: str = "", **v
         hardware_id=printable(hardware_id),
         values=[KeyValue(key=key, value=printable(text)) for key, text in texts.items()],
     )
+
+
+def worst(*levels: bytes) -> bytes:
+    """The level of a status that has several things to report.
+
+    >>> worst(DiagnosticStatus.STALE, DiagnosticStatus.ERROR) == DiagnosticStatus.ERROR
+    True
+    """
+    return max(levels, key=_SEVERITY.index)
 
 
 def values_of(status: DiagnosticStatus) -> dict[str, str]:

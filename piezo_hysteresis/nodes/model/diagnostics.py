@@ -28,7 +28,7 @@ from ...model.model import Model
 from ...model.model_parameters import model_hash
 from ...online.predictor import Predictor
 from ...record import Notice
-from ..messages.conversions import diagnostic
+from ..messages.conversions import diagnostic, worst
 from ..runtime.guarded_node import LOG_INTERVAL, GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
@@ -127,7 +127,7 @@ class ModelDiagnostics:
                 **({} if self._free_run_error is None else {"free_run_error": self._free_run_error}),
             }
         findings = list(self._findings(received, lost, repeated)) or [(DiagnosticStatus.OK, "predicting")]
-        level, message = max(level for level, _ in findings), "; ".join(text for _, text in findings)
+        level, message = worst(*(level for level, _ in findings)), "; ".join(text for _, text in findings)
         self._complaints.shown()
         self._latency = 0.0
         array = DiagnosticArray(

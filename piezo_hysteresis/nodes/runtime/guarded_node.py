@@ -29,7 +29,7 @@ from rclpy.parameter import Parameter
 
 from ...acquisition.stage_lock import StageLock
 from ...errors import reason_of
-from ..messages.conversions import diagnostic, values_of
+from ..messages.conversions import diagnostic, values_of, worst
 
 _REMEMBERED = 10.0
 """Time for which a fault is shown on /diagnostics [s]."""
@@ -103,7 +103,7 @@ class GuardedNode(Node):
         """A stamped status for /diagnostics with the faults so far. A recent fault raises its level."""
         fault = self.recent_fault
         merged = diagnostic(
-            max(status.level, DiagnosticStatus.WARN) if fault else status.level,
+            worst(status.level, DiagnosticStatus.WARN) if fault else status.level,
             status.name,
             f"{status.message}; {fault}" if fault else status.message,
             status.hardware_id,

@@ -28,7 +28,7 @@ from ...acquisition.sample_block import SampleBlock
 from ...model.axes_file import content_hash
 from ...online.axes_joiner import AxesJoiner
 from ...online.axes_predictor import AxesPredictor
-from ..messages.conversions import diagnostic
+from ..messages.conversions import diagnostic, worst
 from ..model.complaints import Complaints
 from ..model.residual_alarm import ResidualAlarm
 from ..runtime.guarded_node import GuardedNode
@@ -125,7 +125,7 @@ class AxesDiagnostics:
                 named = {f"{quantity}_{n}" if n > 1 else quantity: value for n, value in enumerate(of_axes, 1)}
                 values |= {name: value for name, value in named.items() if value is not None}
         findings = list(self._findings(*new)) or [(DiagnosticStatus.OK, "predicting")]
-        level, message = max(level for level, _ in findings), "; ".join(text for _, text in findings)
+        level, message = worst(*(level for level, _ in findings)), "; ".join(text for _, text in findings)
         self._latency = self._level = 0.0
         self._complaints.shown()
         send(self._publisher, self._node.reported(diagnostic(level, self._name, message, self._frame, **values)))

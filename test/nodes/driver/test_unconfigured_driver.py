@@ -18,6 +18,7 @@ import os
 from dataclasses import replace
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from std_srvs.srv import Trigger
 
@@ -62,6 +63,15 @@ def test_a_driver_that_cannot_be_configured_closes_its_stage(lab, monkeypatch, f
     assert lab.transition("configure")
     assert lab.transition("activate")
     lab.streaming()
+
+
+def test_a_fault_of_a_driver_that_is_not_configured_is_a_warning(lab):
+    reports = lab.diagnostics()
+    lab.add(DriverNode, autostart=False).fault(ValueError("broken"))
+    lab.wait(lambda: any("broken" in s.message for a in list(reports) for s in a.status), "the fault")
+    status = next(s for a in list(reports) for s in a.status if "broken" in s.message)
+    assert status.message.startswith("not configured; ")
+    assert status.level == DiagnosticStatus.WARN
 
 
 class OwnWitness(Witness):

@@ -14,8 +14,11 @@
 
 """Blocks and waveforms survive the way through a message; foreign clouds are read by name or refused in one line."""
 
+import itertools
+
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -39,6 +42,16 @@ def test_every_date_of_a_clock_has_a_message_time(nanoseconds):
     """Messages hold dates before 2038-01-19, 03:14:08 UTC; later ones become the last of them."""
     stamp = over_the_wire(conversions.to_stamp(nanoseconds))
     assert conversions.from_stamp(stamp) == min(nanoseconds, 2**31 * 10**9 - 1)
+
+
+def test_what_is_wrong_counts_more_than_what_is_unknown():
+    """The numbers of the levels are not in this order: that of STALE is the largest."""
+    good, unknown, warning, error = (getattr(DiagnosticStatus, name) for name in ("OK", "STALE", "WARN", "ERROR"))
+    for levels in itertools.permutations((good, unknown, warning, error)):
+        assert conversions.worst(*levels) == error
+    assert conversions.worst(unknown, warning) == conversions.worst(warning, unknown) == warning
+    assert conversions.worst(good, unknown) == unknown
+    assert conversions.worst(good) == good
 
 
 @given(hnp.arrays(np.float64, st.integers(1, 50), elements=finite))

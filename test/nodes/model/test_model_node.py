@@ -211,6 +211,9 @@ def test_a_file_whose_model_runs_away_is_reported_and_the_present_model_stays(la
 def test_bad_blocks_and_bad_parameters_are_reported_and_the_node_runs_on(lab, tmp_path):
     bench = Bench(lab, model_file=str(tmp_path / "absent.yaml"))
     bench.report("No such file")
+    (refusal,) = bench._reported("No such file")[-1:]
+    assert "no samples" in refusal.message
+    assert refusal.level == DiagnosticStatus.ERROR
 
     def write(**values):
         request = SetParametersAtomically.Request()

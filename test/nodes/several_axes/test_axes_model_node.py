@@ -165,7 +165,9 @@ def test_three_drivers_are_one_stage_of_three_axes(lab, tmp_path):
 def test_a_wrong_file_a_missing_axis_and_other_numbers_are_told_and_the_node_runs_on(lab, model, tmp_path):
     reports = lab.listen(DiagnosticArray, "/diagnostics", 10)
     lab.start("axes_model_node", axes="/stage_x,/stage_y", model_file=str(tmp_path / "absent.npz"))
-    lab.wait(lambda: reported(reports, "absent.npz: No such file"), "the missing file")
+    refusal = lab.wait(lambda: reported(reports, "absent.npz: No such file"), "the missing file")[-1]
+    assert "no samples" in refusal.message
+    assert refusal.level == DiagnosticStatus.ERROR
 
     def written(path):
         parameter = Parameter("model_file", value=str(path)).to_parameter_msg()
