@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import PiezoError
 from ..model.model import Model
 from .sensor_offset import SensorOffset
 
@@ -43,6 +44,8 @@ class Prediction:
         True while voltages that were not received (before the first block, in a gap) influence the prediction.
     zeroing : (SensorOffset, int)
         Measurement of the sensor offset, and its samples so far; the offset is the same while it is.
+    refused : PiezoError or None
+        Why a new model was dropped after this block, before it could replace the present one.
     """
 
     first: int
@@ -51,3 +54,4 @@ class Prediction:
     model: Model | None
     warming_up: bool
     zeroing: tuple[SensorOffset, int]
+    refused: PiezoError | None = None

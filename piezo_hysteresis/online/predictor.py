@@ -16,12 +16,12 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import DivergenceError, RecordError
+from ..errors import DivergenceError, PiezoError, RecordError
 from ..model.chain import Chain, ChainState
 from ..model.free_run import after_hold
 from ..model.model import Model
@@ -67,23 +67,19 @@ class Predictor:
 
     Raises
     ------
-    RecordError, ParameterError
-        If the sample period is outside the limits, or `rms_time` is not positive.
-    ModelError
-        If the stream is faster than the model.
+    RecordError, ParameterError, ModelError
+        If the sample period is outside the limits, `rms_time` is not positive, or the stream is faster than the model.
 
     Examples
     --------
     >>> from piezo_hysteresis.effects import Arx, BoucWen
     >>> predictor = Predictor(2e-5, Model((BoucWen(), Arx(b=[0.5])), 2e-5))
-    >>> answer = predictor.predict(0, 0, [0.0, 0.0], [3e-6, 3e-6])
-    >>> answer.residual.tolist(), predictor.offset
+    >>> predictor.predict(0, 0, [0.0, 0.0], [3e-6, 3e-6]).residual.tolist(), predictor.offset
     ([0.0, 0.0], 3e-06)
     """
 
     def __init__(self, sample_period: float, model: Model | None = None, rms_time: float = 1.0) -> None:
-        self.sequence, self.sample_period = SequenceCheck(sample_period), sample_period
-        self.model = model
+        self.sequence, self.sample_period, self.model = SequenceCheck(sample_period), sample_period, model
         self.chain: Chain | None = None
         self._swap, self._joined_moving = ModelSwap(), False
         self._rms = RunningRms.over(rms_time, sample_period)
@@ -100,9 +96,14 @@ class Predictor:
         return self._swap.newest is not None
 
     @property
+    def newest_model(self) -> Model | None:
+        """The model that will be in use when it has been run over the history; the present one if there is no other."""
+        return self._swap.newest or self.model
+
+    @property
     def warming_up(self) -> bool:
         """True while voltages that were not received (before the first block, in a gap) influence the prediction."""
-        forgotten = math.inf if self.model is None else FORGETTING * self.model.voltage_scale
+        forgotten = np.inf if self.model is None else FORGETTING * self.model.voltage_scale
         return self._history.known_travel < forgotten
 
     @property
@@ -125,7 +126,7 @@ class Predictor:
         ModelError, ParameterError
             If the stream is faster than the model, or the offset is not finite; the present model stays.
         DivergenceError
-            If the model diverges on the history; the present model stays.
+            If the model diverges on the first part of the history; of a later part, `predict` returns the reason.
         """
         chain = model.at(self.sample_period)
         self._history.tolerance = REST_TOLERANCE * model.voltage_scale
@@ -175,7 +176,7 @@ class Predictor:
         RecordError, ModelError
             If a channel is empty or not finite, or if the lengths differ; the block is then treated as lost.
         DivergenceError
-            If the present or the next model diverges. That model is removed, and the history is kept.
+            If the present model diverges. It is removed, and the history is kept.
         """
         drive, measured = samples(voltage, "voltage"), samples(displacement, "displacement")
         if drive.size != measured.size:
@@ -197,11 +198,14 @@ class Predictor:
         residual = measured[: prediction.size] - prediction
         self._rms.add(residual)
         answer = Prediction(arrival.repeated, prediction, residual, self.model, self.warming_up, self._zero.so_far)
-        self._advance_swap(drive.size)
+        try:
+            self._advance_swap(drive.size)
+        except PiezoError as error:
+            return replace(answer, refused=error)
         return answer
 
     def _begin(self) -> None:
-        newest, self._swap = self._swap.newest or self.model, ModelSwap()
+        newest, self._swap = self.newest_model, ModelSwap()
         self._history = VoltageHistory(self.sample_period)
         self.state: ChainState | None = None
         self._zero_from(0)
@@ -255,10 +259,6 @@ class Predictor:
         if warmup is None:
             return
         self.model, self.chain, self.state = warmup.model, warmup.chain, warmup.state
-        if warmup.offset is not None:
-            self._zero = SensorOffset.known(self._history.count, warmup.offset)
-        elif warmup.zero is self._zero and warmup.mean is not None:
-            self._zero.remodel(warmup.mean)
-        else:
-            self._zero_from(self._history.count)
-        self._rms.clear()
+        known = warmup.known_offset(self._zero)
+        self._zero_from(self._history.count)
+        self._zero = known or self._zero

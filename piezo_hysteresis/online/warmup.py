@@ -79,6 +79,15 @@ class Warmup:
         """Mean prediction [m] over the window; None if the history begins after it."""
         return self._sum / self._weight if self._weight else None
 
+    def known_offset(self, present: SensorOffset) -> SensorOffset | None:
+        """The present offset of the stream as that of this model; None where it has to be measured again."""
+        if self.offset is not None:
+            return SensorOffset.known(self._history.count, self.offset)
+        if self.zero is not present or self.mean is None:
+            return None
+        present.remodel(self.mean)
+        return present
+
     def advance(self, values: int) -> bool:
         """Run the model over the next piece of the history.
 

@@ -487,3 +487,20 @@ def test_a_constant_sensor_offset_in_the_model_changes_nothing() -> None:
     measured = truth(MODEL, voltage)
     answers = feed(Predictor(PERIOD, MODEL.with_effect(Offset(y0=1e-3))), voltage, measured)
     np.testing.assert_allclose(residual(answers), 0.0, atol=1e-15)
+
+
+def test_a_new_model_that_diverges_late_in_the_history_leaves_the_present_one_in_use() -> None:
+    """Its run over a long history ends in a later block, whose prediction by the present model is as good as any."""
+    wild = Model((BoucWen(p2=1000.0), Arx(b=[1e6, 1e6, 1e6, 1e6])), PERIOD)
+    voltage = np.concatenate((0.01 * sine(100_000, rest=1000), sine(20_000)))
+    measured = truth(MODEL, voltage)
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, voltage[:115_000], measured[:115_000], 5000)
+    predictor.swap(wild)
+    assert predictor.newest_model is wild
+    after = feed(predictor, voltage[115_000:], measured[115_000:], first=115_000, stamp=2_300_000_000)
+    np.testing.assert_allclose(residual(after), 0.0, atol=1e-18)
+    assert all(answer.model is MODEL for answer in after)
+    (refused,) = [answer.refused for answer in after if answer.refused is not None]
+    assert isinstance(refused, DivergenceError)
+    assert predictor.newest_model is predictor.model is MODEL

@@ -110,7 +110,7 @@ class AppliedState:
         PiezoError
             On samples that no stage can give, and on a model that diverges.
         """
-        self._predictor.predict(
+        answer = self._predictor.predict(
             int(block.index[0]),
             block.stamp + round(float(block.time[0]) * 1e9),
             block.voltage,
@@ -121,6 +121,8 @@ class AppliedState:
         self.voltage, self.is_held = float(block.voltage[-1]), is_held(block.voltage)
         if block.size > 1 and self.is_held:
             self.noise = float(np.sqrt(0.5 * np.mean(np.diff(block.displacement) ** 2)))
+        if answer.refused is not None:
+            raise answer.refused
 
 
 def check_period(model: Model, period: float) -> None:

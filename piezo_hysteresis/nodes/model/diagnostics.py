@@ -148,7 +148,9 @@ class ModelDiagnostics:
             yield DiagnosticStatus.WARN, f"{lost} samples were lost; the voltage was held constant over the gap"
         if repeated:
             yield DiagnosticStatus.WARN, f"{repeated} samples came more than once or too late and were dropped"
-        if predictor.model is None and self._model is None:
+        if predictor.model is None and predictor.is_swapping:
+            yield DiagnosticStatus.WARN, "the model is being run over the drive voltages so far"
+        elif predictor.model is None and self._model is None:
             yield DiagnosticStatus.WARN, "there is no model; give model_file, or identify the stage"
         elif predictor.model is None:
             yield (

@@ -101,6 +101,9 @@ class ModelNode(GuardedNode):
         except PiezoError as error:
             self._diagnostics.problem(str(error))
             return
+        if answer.refused is not None:
+            self._diagnostics.refused(str(answer.refused))
+        self._use(predictor.model)
         self._diagnostics.saw(block, now(self))
         if answer.model is not None and answer.prediction.size:
             counted = block.after(answer.first)
@@ -121,10 +124,11 @@ class ModelNode(GuardedNode):
         if period is None:
             return present
         if present is None or abs(period / present.sample_period - 1.0) > TOLERANCE:
+            model = self._model if present is None else present.newest_model or self._model
             self._predictor = Predictor(round_period(period, 1e-6), rms_time=self._values["rms_time"])
             self._diagnostics.follow(self._predictor)
-            if self._model is not None:
-                self._predictor.swap(self._model)
+            if model is not None:
+                self._predictor.swap(model)
         return self._predictor
 
     def _on_model(self, message: String) -> None:
@@ -137,10 +141,8 @@ class ModelNode(GuardedNode):
 
     def _is_followed(self, model: Model) -> bool:
         """True where this model is in use or about to be, for example after a recalibration by this node."""
-        predictor = self._predictor
-        if predictor is None or self._model is None or model_hash(model) != model_hash(self._model):
-            return False
-        return predictor.is_swapping or predictor.model is self._model
+        newest = None if self._predictor is None else self._predictor.newest_model
+        return newest is not None and model_hash(model) == model_hash(newest)
 
     def end(self) -> None:
         """End a running fit."""
@@ -161,10 +163,17 @@ class ModelNode(GuardedNode):
             self._diagnostics.refused(f"model_file: {error}")
 
     def _follow(self, model: Model, offset: float | None = None) -> None:
-        if self._predictor is not None:
+        if self._predictor is None:
+            self._use(model)
+        else:
             self._predictor.swap(model, offset)
-        self._model = model
-        self._diagnostics.model(model)
+            self._use(self._predictor.model)
+
+    def _use(self, model: Model | None) -> None:
+        """Report a model that is in use from now on. One that cannot predict is kept for a stream of another period."""
+        if model is not None and model is not self._model:
+            self._model = model
+            self._diagnostics.model(model)
 
     def _on_zero(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success = self._predictor is not None

@@ -46,12 +46,16 @@ MODEL = Model((BoucWen(), Arx(a=[-0.8], b=[0.05])), PERIOD, displacement_scale=1
 OTHER = MODEL.with_values({"bouc_wen.p2": 2.0})
 
 
-def stream(blocks: int) -> list[SampleBlock]:
-    """Ten blocks of rest, then a sine of 20 Hz, measured with noise; the index wraps on the way."""
+def stream(blocks: int, small: int = 0) -> list[SampleBlock]:
+    """Ten blocks of rest, then a sine of 20 Hz, measured with noise; the index wraps on the way.
+
+    The first `small` blocks have 1/1000 of the amplitude.
+    """
     time = PERIOD * np.arange(SIZE)
     count = np.arange(blocks * SIZE)
     moving = np.maximum(0, count - 10 * SIZE)
     voltage = 3 - 3 * np.cos(2 * np.pi * 20 * PERIOD * moving)
+    voltage[: small * SIZE] *= 1e-3
     noise = 1e-8 * np.random.default_rng(1).standard_normal(voltage.size)
     displacement = 5e-6 + MODEL.run(voltage, MODEL.rest(0.0))[0] + noise
     index = ((2**32 - 1500) + count).astype(np.uint64).astype(np.uint32)
@@ -206,6 +210,29 @@ def test_a_file_whose_model_runs_away_is_reported_and_the_present_model_stays(la
     assert bench.report("model_file: ")["faults"] == "0"
     bench.send(blocks[20:])
     assert (bench.predicted(30)[-1]["model"] == hash_number(MODEL)).all()
+
+
+def test_a_model_that_runs_away_late_in_the_history_was_never_in_use(lab, tmp_path):
+    """The node reported it, judged the residual by its error, and gave it to the next stream."""
+    bench = Bench(lab, model_file=str(save(MODEL, tmp_path / "model.yaml")))
+    models = lab.publisher(String, "model", LATCHED)
+    blocks = stream(600, small=540)
+    for first in range(0, 560, 40):
+        bench.send(blocks[first : first + 40])
+        bench.predicted(first + 40)
+    wild = Model((BoucWen(p2=1000.0), Arx(b=[1e6] * 4)), PERIOD, provenance={"free_run_error": "1.0"})
+    models.publish(String(data=dumps(wild)))
+    swapping = lab.wait(lambda: [s for s in bench._reported("") if values_of(s).get("swapping") == "True"], "the swap")
+    assert values_of(swapping[-1])["model"] == model_hash(MODEL)
+    bench.send(blocks[560:580])
+    assert (bench.predicted(580)[-1]["model"] == hash_number(MODEL)).all()
+    values = bench.report("diverged")
+    assert (values["model"], values["free_run_error"]) == (model_hash(MODEL), "1e-09")
+    assert values["faults"] == "0"
+    assert model_hash(wild) not in lab.processes[0].output
+    slower = [replace(block, time=2.0 * block.time, index=block.index - blocks[580].index[0]) for block in blocks[580:]]
+    bench.send([replace(block, stamp=2 * block.stamp) for block in slower])
+    assert (bench.predicted(600)[-1]["model"] == hash_number(MODEL)).all()
 
 
 def test_bad_blocks_and_bad_parameters_are_reported_and_the_node_runs_on(lab, tmp_path):
