@@ -19,6 +19,7 @@ from __future__ import annotations
 import tempfile
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -31,10 +32,11 @@ from ...acquisition.sample_block import SampleBlock
 from ...changes.minute import Minute
 from ...changes.moved_group import group_to_fit
 from ...changes.recalibration_history import Recalibrations, write_numbers
-from ...errors import IdentificationError, PiezoError, RecordingError
+from ...errors import IdentificationError, PiezoError, RecordingError, reason_of
 from ...model.model import Model
 from ...model.model_file import dumps, loads, save
 from ...model.model_parameters import model_hash
+from ...online.change.baseline import Baseline
 from ...online.change.watch import baseline_path
 from ...online.prediction import Prediction
 from ...online.predictor import Predictor
@@ -73,6 +75,7 @@ class Recalibrator:
         self._recent: RecentDisplacement | None = None
         self._predictor: Predictor | None = None
         self._fit: _Fit | None = None
+        self._fitted: _Fitted | None = None
         self._history: Recalibrations | None = None
         self._table = advertise(node, "recalibrations")
         self._models = advertise(node, "recalibrated_model")
@@ -86,10 +89,10 @@ class Recalibrator:
         node.create_timer(_TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def end(self) -> None:
-        """End a running fit without its result."""
-        if self._fit is not None:
-            self._fit.close()
-            self._fit = None
+        """End a running recalibration without its result."""
+        fit, self._fit, self._fitted = self._fit, None, None
+        if fit is not None:
+            fit.close()
 
     def add(self, block: SampleBlock, answer: Prediction, predictor: Predictor) -> None:
         """Keep the displacement of a block that `answer` predicts, while there is a baseline."""
@@ -103,7 +106,7 @@ class Recalibrator:
     def _group(self) -> str:
         """The group to fit; raises IdentificationError with the reason where a recalibration is impossible."""
         watch = self._changes.watch
-        if self._fit is not None:
+        if self._fit is not None or self._fitted is not None:
             raise IdentificationError("a recalibration is under way; wait")
         if watch.baseline is None:
             raise IdentificationError("no baseline; call ~/baseline while the stage is known to be good")
@@ -149,40 +152,54 @@ class Recalibrator:
         return response
 
     def _tick(self) -> None:
-        fit = self._fit
-        if fit is None:
-            return
         try:
-            outcome = fit.poll()
-            if outcome is None:
-                return
+            fit = self._fit
+            outcome = None if fit is None else fit.poll()
+            if fit is not None and outcome is not None:
+                self.end()
+                self._begin_swap(fit, outcome)
+            if self._fitted is not None:
+                self._finish(self._fitted)
+        except Exception as error:
             self.end()
-            self._apply(fit, outcome)
-        except PiezoError as error:
-            self.end()
+            self._changes.report_recalibration(f"refused: {reason_of(error)}")
+            if not isinstance(error, PiezoError):
+                raise  # the node counts and shows it as a fault
             self._node.get_logger().warning(f"recalibration: {error}")
-            self._changes.report_recalibration(f"refused: {error}")
 
-    def _apply(self, fit: _Fit, outcome: RecalibrationOutcome) -> None:
-        if self._predictor is not fit.predictor or fit.predictor.model is not fit.model:
+    def _begin_swap(self, fit: _Fit, outcome: RecalibrationOutcome) -> None:
+        if self._predictor is not fit.predictor or fit.predictor.newest_model is not fit.model:
             raise IdentificationError("another model or another stream is in use by now; nothing was changed")
         model, baseline = loads(outcome.model), self._changes.watch.baseline
         if baseline is None:
             raise IdentificationError("the baseline was removed meanwhile; nothing was changed")
-        is_new = model_hash(model) != model_hash(fit.model)
+        fitted = _Fitted(fit.model, model, baseline.of_model(model_hash(model)), outcome)
+        self._swap(model, outcome.offset if fit.predictor.offset == fit.offset else None)
+        self._changes.adopt(model, fitted.baseline)
+        self._fitted = fitted
+
+    def _finish(self, fitted: _Fitted) -> None:
+        """Keep and publish the new model as soon as it is in use."""
+        predictor, model, outcome = self._predictor, fitted.model, fitted.outcome
+        newest = None if predictor is None else predictor.newest_model
+        if newest is fitted.before:
+            raise IdentificationError("the new model diverges on the drive voltages so far; nothing was changed")
+        if predictor is None or newest is not model:
+            raise IdentificationError("another model is in use by now; the new one was not kept")
+        if predictor.model is not model:
+            return
+        self._fitted = None
+        is_new = model_hash(model) != model_hash(fitted.before)
         folder, problem = self._changes.folder, ""
-        baseline = baseline.of_model(model_hash(model))
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            baseline.save(baseline_path(folder, baseline.model))
+            fitted.baseline.save(baseline_path(folder, fitted.baseline.model))
             if is_new:
                 save(model, folder / f"recalibrated_{model_hash(model).partition(':')[2]}.yaml")
             if self._history is not None:
                 self._history.add(outcome.numbers)
         except (OSError, PiezoError) as error:
             problem = f"; not kept: {error}"
-        self._changes.adopt(model, baseline)
-        self._swap(model, outcome.offset if fit.predictor.offset == fit.offset else None)
         if is_new:
             send(self._models, String(data=dumps(model)))
         self._publish()
@@ -195,6 +212,16 @@ class Recalibrator:
             send(self._table, String(data=write_numbers(self._history.numbers[-_SHOWN:])))
 
 
+@dataclass(frozen=True, slots=True)
+class _Fitted:
+    """A recalibrated model on its way into use, with the model before it and its baseline."""
+
+    before: Model
+    model: Model
+    baseline: Baseline
+    outcome: RecalibrationOutcome
+
+
 class _Fit:
     """A fit in another process. A thread writes its data, so that the stream does not wait."""
 
@@ -202,23 +229,25 @@ class _Fit:
         self.model, self.predictor, self.offset = model, predictor, offset
         self._folder = tempfile.TemporaryDirectory(prefix="piezo_recalibration_", ignore_cleanup_errors=True)
         self._process: FitProcess[RecalibrationOutcome] | None = None
-        self._failure: OSError | None = None
+        self._failure: Exception | None = None
 
         def prepare() -> None:
             try:
                 write(Path(self._folder.name))
-            except OSError as error:
+            except Exception as error:  # it is raised again where it is reported
                 self._failure = error
 
         self._thread = threading.Thread(target=prepare, name="recalibration", daemon=True)
         self._thread.start()
 
     def poll(self) -> RecalibrationOutcome | None:
-        """The outcome, or None while the fit is running; raises IdentificationError with the reason where it failed."""
+        """The outcome, or None while the fit is running; raises the reason where it failed."""
         if self._thread.is_alive():
             return None
-        if self._failure is not None:
+        if isinstance(self._failure, OSError) and self._failure.strerror:
             raise IdentificationError(f"the samples cannot be written ({self._failure.strerror}); is the disk full?")
+        if self._failure is not None:
+            raise self._failure
         if self._process is None:
             self._process = FitProcess(recalibration, Path(self._folder.name), dumps(self.model))
         return self._process.poll()
