@@ -89,7 +89,7 @@ def published(lab, node):
 def test_every_topic_is_published_as_documented(nodes):
     documented = {node: {} for node in NODES}
     for name, (kind, _, _, _, by) in rows("Topics"):
-        for node in NODES if by == "all" else [by] if by in NODES else []:
+        for node in NODES if by == "all" else NODES.keys() & by.split(", "):
             documented[node]["/" + name.lstrip("/")] = kind
     for topic in TOPICS.values():
         for node in topic.senders:
@@ -100,7 +100,7 @@ def test_every_topic_is_published_as_documented(nodes):
 
 def test_quality_of_service_is_as_documented(nodes):
     for name, (_, _, quality, _, by) in rows("Topics"):
-        if by not in NODES:
+        if not NODES.keys() & by.split(", "):
             continue
         for info in nodes.node.get_publishers_info_by_topic("/" + name):
             profile = info.qos_profile
@@ -123,7 +123,7 @@ def test_every_input_topic_has_a_subscriber(nodes):
 
 
 def test_every_service_is_served_as_documented(nodes):
-    documented = {f"/{name}": cells[0] for name, cells in rows("Services")}
+    documented = {f"/{name}": cells[0] for name, cells in rows("Services") if not name.startswith("axes_model_node/")}
     nodes.wait(lambda: documented.keys() <= served(nodes).keys(), "every service that is documented")
     assert served(nodes) == documented
 
