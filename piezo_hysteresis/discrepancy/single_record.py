@@ -155,7 +155,7 @@ def _extended(
         more = select(now.model, data, score, fitting, lambda w, f: state.progress(w, 0.6 + 0.3 * f))
     extended = more.accepted[-1].best.fit if more.accepted else None
     contenders = [] if found else [now]
-    enough = len(setup.usable) >= FEWEST_RECORDS and has_several_drives(setup.records, setup.fitted)
+    enough = len(setup.usable) >= FEWEST_RECORDS
     if extended is not None and (enough or not is_certain):  # few records show no effect beside a certain one
         contenders.append(extended)
     best = _best(setup, model, found, contenders, LEADS if is_certain else EXTENDS)
