@@ -39,8 +39,6 @@ BREAKS = re.compile(r"(?<=[…,;]) ")
 """Places inside a cell of numbers where a line may end."""
 SPACE = re.compile(r"\s+")
 """Places inside a text where a line may end."""
-SEVERE = "Severe findings above: check the recording before you use it."
-"""Last line after severe findings in the data."""
 LINE_INTERVAL = 10.0
 """Time between two lines of progress in a file [s]."""
 
@@ -100,6 +98,14 @@ def show_notices(notices: Iterable[Notice]) -> None:
     for notice in notices:
         where = f" [{notice.phase}]" if notice.phase else ""
         out.print(f"{'caution' if notice.severe else 'note'}{where}: {notice.message}")
+
+
+def severe_status(notices: Iterable[Notice]) -> int:
+    """Exit status: 1 after severe findings in the data, which a last line then says, otherwise 0."""
+    if not any(notice.severe for notice in notices):
+        return 0
+    console().print("Severe findings above: check the recording before you use it.", style="bold")
+    return 1
 
 
 PER_MINUTE = 250_000

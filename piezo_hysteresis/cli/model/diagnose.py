@@ -31,7 +31,7 @@ from ...report.verdict import answer_verdict
 from ..options import reading_options
 from ..options.destination import add_results, require_new_file, require_new_results
 from ..options.stage_option import add_stage_arguments, diagnose_stage
-from ..terminal import SEVERE, console, progress, show, show_notices, usual_time
+from ..terminal import console, progress, severe_status, show, show_notices, usual_time
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -107,10 +107,7 @@ def run(args: argparse.Namespace) -> int:
     for written in (path, corrected, args.json, args.report):
         if written:
             out.print(f"wrote {written}")
-    if any(notice.severe for notice in found.experiment.notices):
-        out.print(SEVERE, style="bold")
-        return 1
-    return 0
+    return severe_status(found.experiment.notices)
 
 
 def _save_corrected(found: Diagnosis, path: str | None) -> str:

@@ -28,7 +28,7 @@ from ...report.json_file import write_json
 from ...report.tables.quality_table import notice_table, record_table, understood_table
 from ..options import reading_options
 from ..options.destination import require_new_experiment, require_new_file
-from ..terminal import SEVERE, console, show
+from ..terminal import console, severe_status, show
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -89,10 +89,7 @@ def run(args: argparse.Namespace) -> int:
                 ],
             },
         )
-    if any(notice.severe for notice in experiment.notices):
-        console().print(SEVERE, style="bold")
-        return 1
-    return 0
+    return severe_status(experiment.notices)
 
 
 def _show_preview(experiment: Experiment, picture: Path) -> None:
