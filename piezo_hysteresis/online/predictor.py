@@ -129,9 +129,8 @@ class Predictor:
             If the model diverges on the first part of the history; of a later part, `predict` returns the reason.
         """
         chain = model.at(self.sample_period)
-        self._history.tolerance = REST_TOLERANCE * model.voltage_scale
         if self._history.count == 0:
-            self.chain, self.model = chain, model
+            self.chain, self.model, self._history.tolerance = chain, model, REST_TOLERANCE * model.voltage_scale
             return
         self._swap.request(model, offset)
         if not self._swap.is_running:
@@ -259,6 +258,7 @@ class Predictor:
         if warmup is None:
             return
         self.model, self.chain, self.state = warmup.model, warmup.chain, warmup.state
+        self._history.tolerance = REST_TOLERANCE * warmup.model.voltage_scale
         known = warmup.known_offset(self._zero)
         self._zero_from(self._history.count)
         self._zero = known or self._zero

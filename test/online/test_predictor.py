@@ -504,3 +504,16 @@ def test_a_new_model_that_diverges_late_in_the_history_leaves_the_present_one_in
     (refused,) = [answer.refused for answer in after if answer.refused is not None]
     assert isinstance(refused, DivergenceError)
     assert predictor.newest_model is predictor.model is MODEL
+
+
+def test_what_counts_as_motion_is_decided_by_the_model_in_use() -> None:
+    """While a model of a large stage is run over the history, a travel of volts still makes the state known."""
+    large = replace(MODEL, voltage_scale=1e5)
+    voltage = sine(403_000)
+    measured = truth(MODEL, voltage)
+    predictor = Predictor(PERIOD, MODEL)
+    feed(predictor, voltage[:399_500], measured[:399_500], 4700)
+    predictor.swap(large)
+    feed(predictor, voltage[400_000:], measured[400_000:], first=400_000, stamp=8_000_000_000)  # 500 samples were lost
+    assert predictor.newest_model is large and predictor.model is MODEL
+    assert not predictor.warming_up
