@@ -229,13 +229,21 @@ class LiveDiagnosis:
         return replace(self, due=(), due_name="", separation=separation, end=end)
 
 
-def begin(limits: DriveLimits, *, seed: int = 0, **choices: Any) -> LiveDiagnosis:
+def begin(
+    limits: DriveLimits,
+    *,
+    error_rate: float = ERROR_RATE,
+    longest: float = LONGEST,
+    seed: int = 0,
+    effects: tuple[type[Effect], ...] = CATALOGUE,
+    chooses: bool = True,
+) -> LiveDiagnosis:
     """A live diagnosis before anything has moved; its first tier is due.
 
     Parameters
     ----------
-    limits, seed, **choices
-        As for `LiveDiagnosis`: ``error_rate``, ``longest``, ``effects``, ``chooses``.
+    limits, error_rate, longest, seed, effects, chooses
+        As for `LiveDiagnosis`.
 
     Raises
     ------
@@ -244,11 +252,12 @@ def begin(limits: DriveLimits, *, seed: int = 0, **choices: Any) -> LiveDiagnosi
     """
     plan = tiers(limits, seed)
     first = plan[0]
-    live = LiveDiagnosis(limits, plan, seed=seed, due=first.phases, due_name=first.name, tier=1, **choices)
-    if not 0.0 < live.error_rate < 0.5:
-        raise ParameterError(f"error rate: got {live.error_rate:g}, expected more than 0 and less than 0.5")
-    if not live.longest >= first.duration:
+    if not 0.0 < error_rate < 0.5:
+        raise ParameterError(f"error rate: got {error_rate:g}, expected more than 0 and less than 0.5")
+    if not longest >= first.duration:
         raise ParameterError(
-            f"stage time: got {live.longest:g} s, expected at least the {first.duration:.1f} s of the first phases"
+            f"stage time: got {longest:g} s, expected at least the {first.duration:.1f} s of the first phases"
         )
-    return live
+    return LiveDiagnosis(
+        limits, plan, error_rate, longest, seed, effects, chooses, due=first.phases, due_name=first.name, tier=1
+    )
