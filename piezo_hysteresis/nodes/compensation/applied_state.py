@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...acquisition.sample_block import SampleBlock
-from ...errors import ModelError
+from ...errors import DivergenceError, ModelError, PiezoError
 from ...model.chain import ChainState
 from ...model.model import Model
 from ...online.predictor import Predictor
@@ -52,11 +52,17 @@ class AppliedState:
         self.is_held = False
         self._predictor = Predictor(sample_period)
         self._wanted: Model | None = None
+        self._refusal = "no model was received"
 
     @property
     def is_ready(self) -> bool:
-        """Whether the newest model has been run over the applied voltages."""
-        return self._predictor.state is not None and not self._predictor.is_swapping
+        """Whether the newest model has been run over the applied voltages, or was refused there."""
+        return not self._predictor.is_swapping
+
+    @property
+    def missing(self) -> str:
+        """Why there is no model; empty where one is in use, or is being run over the applied voltages."""
+        return "" if self._predictor.newest_model else self._refusal
 
     @property
     def is_known(self) -> bool:
@@ -73,7 +79,7 @@ class AppliedState:
             If no model was received, or the model diverged on the applied voltages.
         """
         if self._predictor.model is None:
-            raise ModelError("the model diverged on the voltages that were applied; identify again")
+            raise ModelError(self.missing or "the model is being run over the applied voltages")
         return self._predictor.model
 
     @property
@@ -102,27 +108,37 @@ class AppliedState:
             self._wanted = model
             self._predictor.swap(model)
 
-    def take(self, block: SampleBlock) -> None:
+    def take(self, block: SampleBlock) -> PiezoError | None:
         """Run the model over a block. Over lost samples the last voltage is held.
+
+        Returns
+        -------
+        PiezoError or None
+            Why a model is not used from now on: the present one diverges, or a new one did on the applied voltages.
 
         Raises
         ------
-        PiezoError
-            On samples that no stage can give, and on a model that diverges.
+        RecordError
+            On samples that no stage can give.
         """
-        answer = self._predictor.predict(
-            int(block.index[0]),
-            block.stamp + round(float(block.time[0]) * 1e9),
-            block.voltage,
-            block.displacement,
-            follows_gap=block.follows_gap,
-            settled=block.index[0] == 0 or block.phase[0] == 0,
-        )
+        refused: PiezoError | None
+        try:
+            refused = self._predictor.predict(
+                int(block.index[0]),
+                block.stamp + round(float(block.time[0]) * 1e9),
+                block.voltage,
+                block.displacement,
+                follows_gap=block.follows_gap,
+                settled=block.index[0] == 0 or block.phase[0] == 0,
+            ).refused
+        except DivergenceError as error:
+            refused = error
         self.voltage, self.is_held = float(block.voltage[-1]), is_held(block.voltage)
         if block.size > 1 and self.is_held:
             self.noise = float(np.sqrt(0.5 * np.mean(np.diff(block.displacement) ** 2)))
-        if answer.refused is not None:
-            raise answer.refused
+        if refused is not None:
+            self._refusal = f"the model was refused on the voltages that were applied: {refused}; identify again"
+        return refused
 
 
 def check_period(model: Model, period: float) -> None:

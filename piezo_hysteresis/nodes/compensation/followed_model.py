@@ -66,19 +66,19 @@ class FollowedModel:
         subscribe(node, "model", self._on_model)
 
     def take(self, block: SampleBlock, driver: DriveLimits | None) -> None:
-        """Run the model over a block of samples of this driver.
+        """Run the model over a block of samples of this driver; a model that is refused there is reported.
 
         Raises
         ------
-        PiezoError
-            On a model of another sample period or one that diverges, and on samples that no stage can give.
+        RecordError
+            On samples that no stage can give.
         """
         if driver is not None and (self.applied is None or self.applied.sample_period != driver.sample_period):
             self.applied = AppliedState(driver.sample_period)
-            if self._newest is not None:
-                self.applied.follow(self._newest)
-        if self.applied is not None:
-            self.applied.take(block)
+            self.catch_up()
+        if self.applied is not None and (refused := self.applied.take(block)):
+            rest = "" if self.applied.missing else "; the model before it stays in use"
+            self._status.refuse("model", f"{refused}{rest}")
 
     def ready(self, driver: DriveLimits) -> AppliedState:
         """State from which a plan can start.
@@ -86,13 +86,16 @@ class FollowedModel:
         Raises
         ------
         PiezoError
-            If there are no samples or no model yet, or the model is of another sample period than the driver.
+            If there are no samples or no model yet, or the model is of another sample period than the driver or was
+            refused on the applied voltages.
         """
         if self.applied is None:
             raise StageError("no samples yet; is the driver active?")
         if self._newest is None:
             raise ModelError("no model yet; expected model_file, or a model on the topic 'model'")
         check_period(self._newest, driver.sample_period)
+        if self.applied.missing:
+            raise ModelError(self.applied.missing)
         return self.applied
 
     def catch_up(self) -> None:
@@ -100,7 +103,7 @@ class FollowedModel:
         if self.applied is not None and self._newest is not None:
             try:
                 self.applied.follow(self._newest)
-            except ModelError as error:
+            except PiezoError as error:
                 self._status.refuse("model", str(error))
 
     def _on_model(self, message: String) -> None:
