@@ -138,7 +138,7 @@ class IterativeLearning:
         measured : (m,) ndarray
             Displacement at every sample of the drive of `next` [m].
         start : ChainState, optional
-            State of the model before the next round. Default: at rest, as for `plan`.
+            State of the model before the next round. Default: that before this one.
 
         Returns
         -------
@@ -172,7 +172,8 @@ class IterativeLearning:
             return None
         self._reference = self._reference + correction
         following = plan(
-            self.model, self._reference, self.limits, start=start, band=played.band, approximate=self.approximate,
+            self.model, self._reference, self.limits,
+            start=start or played.start, band=played.band, approximate=self.approximate,
             approach=(played.begin - played.preview) * played.sample_period,
             way_back=(played.voltage.size - played.begin - played.wanted.size) * played.sample_period,
         )  # fmt: skip

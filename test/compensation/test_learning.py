@@ -125,6 +125,16 @@ def test_every_round_has_the_band_of_the_first_plan() -> None:
     assert got.rounds[0].plan.preview > plan(model, WANTED, LIMITS).preview
 
 
+def test_every_round_begins_and_ends_where_the_first_one_does() -> None:
+    """A stage that rests at 3 V would step to 0 V at the first sample of a round that was planned from 0 V."""
+    model, rest = stage(), 3.0
+    first = plan(model, WANTED, LIMITS, start=model.rest(rest), way_back=0.02)
+    got = learn(IterativeLearning(model, first, LIMITS), lambda u: TRUTH.run(u, TRUTH.rest(rest))[0])
+    assert len(got.rounds) == 3 and got.best is got.rounds[-1]
+    for played in got.rounds:
+        assert played.plan.voltage[[0, -1]] == pytest.approx([rest, rest], abs=1e-9)
+
+
 def test_the_gain_is_zero_where_the_response_makes_convergence_unsure() -> None:
     frequency = np.array([0.0, 500.0, 600.0, 700.0, 800.0, 5000.0])
     turned = np.array([1.0, 1.0, -1.0, -1.0, 1.0, 1.0]).astype(complex)
