@@ -146,6 +146,18 @@ def test_a_refused_voltage_ends_a_hold_on_its_way_only(distance, age, ended) -> 
     assert len(lost) == ended
 
 
+@pytest.mark.parametrize("integral_time", [1e-3, 0.03, 1.0])
+def test_no_integral_time_and_no_pause_of_the_samples_makes_the_hold_unstable(integral_time: float) -> None:
+    """A correction by more than twice the error makes it larger; an error that was not measured cannot add up."""
+    driver = Driver(1e-6, 0.0)
+    point = SetPoint(driver, integral_time)
+    point.go(5e-6, 5.3, 1e6, Limits(0.0, 10.0))
+    for _ in range(50):
+        point.tick(TICK)  # no samples for 5 s
+    assert all(4.7 <= voltage <= 5.3 for voltage in driver.hold(point, 100))
+    assert driver.voltages[-1] == pytest.approx(5.0, abs=1e-3)
+
+
 def test_without_an_integral_time_nothing_is_corrected() -> None:
     driver = Driver(1e-6, 0.0)
     point = SetPoint(driver, 0.0)

@@ -66,7 +66,8 @@ class SetPoint:
     publisher : rclpy.publisher.Publisher
         Publisher of `set_voltage`.
     integral_time : float
-        Time constant with which a constant error is corrected [s]; 0 switches the integral off.
+        Time constant with which a constant error is corrected [s]; below the interval of the corrections, each of them
+        corrects the whole error. 0 switches the integral off.
     """
 
     def __init__(self, publisher: Any, integral_time: float) -> None:
@@ -156,8 +157,8 @@ class SetPoint:
         if self._target is None or not self._integral_time or self._waited < _INTERVAL or not self._count:
             return
         error = self._target - self._sum / self._count
-        change = self._slope * error * self._waited / self._integral_time
-        wanted = self._voltage + change
+        share = min(self._waited / self._integral_time, 1.0)  # more than the error makes the loop unstable
+        wanted = self._voltage + self._slope * error * share
         self._voltage = float(np.clip(wanted, self._limits.voltage_min, self._limits.voltage_max))
         self._send()
 
