@@ -27,6 +27,13 @@ Array = NDArray[np.float64]
 
 APPROACH = 0.05
 """Default duration of the transition [s]."""
+FEWEST = 200
+"""Fewest samples of a transition. The band makes a shorter one swing below its begin by more than 0.01 % of it."""
+
+
+def transition_samples(duration: float, sample_period: float) -> int:
+    """Number of samples of a transition of this duration [s], at least `FEWEST`; 0 without a transition."""
+    return max(round(duration / sample_period), FEWEST) if duration > 0.0 else 0
 
 
 def settled_start(model: Model, limits: Limits) -> ChainState:

@@ -37,6 +37,8 @@ Array = NDArray[np.float64]
 
 LEAST, MOST = 1e-4, 1e-2
 """Deviations below the free-run error of the model count as zero; these shares of the range of the path bound it."""
+RESOLVED = 1e-4
+"""Ranges of a path below this share of that with the way to it count as this share: they are near rounding."""
 
 
 def reachable(
@@ -47,6 +49,7 @@ def reachable(
     start: ChainState | None = None,
     band: Band | None = None,
     approximate: bool = False,
+    approach: int = 0,
 ) -> Reachability:
     """Compare a path with and without the limits of the drive and of the amplifier, from the model alone.
 
@@ -62,6 +65,8 @@ def reachable(
         State of the model before the path. Default: at rest at 0 V, or at the limit that is nearest to it.
     band, approximate
         As for `Inverse`.
+    approach : int
+        Number of the first samples that are the way to the path. It may deviate more where the path is much smaller.
 
     Returns
     -------
@@ -83,14 +88,15 @@ def reachable(
     no_voltage = _is_at_an_end(needed, free, state)[free.preview :]
     off = reached - np.where(no_voltage, y, aim)
     span = float(np.ptp(y)) or float(np.abs(y).max()) or model.displacement_scale
-    span = min(span, model.displacement_scale)  # what is too large is not allowed a larger error
-    tolerance = float(np.clip(free_run_error(model) or 0.0, LEAST * span, MOST * span))
-    bad = np.flatnonzero(np.abs(off) > tolerance)
+    allowed = np.full(y.size, _allowed(model, span))
+    allowed[approach:] = _allowed(model, max(float(np.ptp(y[approach:])) or span, RESOLVED * span))
+    bad = np.flatnonzero(np.abs(off) > allowed)
     lowest, direction = _at_the_lowest_voltage(model, limits)
     settling = np.full(max(round(APPROACH / model.sample_period), limited.preview, 1), limits.voltage_min)
     parts, moved, played = [], state, 0
     for a, b in _runs(bad, max(1, round(2e-3 / model.sample_period))):
         worst = a + int(np.abs(off[a : b + 1]).argmax())
+        tolerance = float(allowed[worst])
         kept = direction * (float(aim[worst]) - lowest) >= -tolerance
         part = _part(model, limits, needed[a : b + free.preview + 1], a, b + 1, float(off[worst]))
         if no_voltage[worst]:
@@ -102,6 +108,12 @@ def reachable(
             part = replace(part, after_loop=direction * (float(held[-1]) - float(aim[worst])) > tolerance)
         parts.append(part)
     return Reachability(tuple(parts), reached, given)
+
+
+def _allowed(model: Model, span: float) -> float:
+    """Deviation that counts as zero on a path of this range [m]."""
+    span = min(span, model.displacement_scale)  # what is too large is not allowed a larger error
+    return float(np.clip(free_run_error(model) or 0.0, LEAST * span, MOST * span))
 
 
 def without_amplifier_limits(model: Model) -> Model:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ..model.chain import ChainState
 from ..model.model import Model
-from .approach import APPROACH, smooth_transition
+from .approach import APPROACH, smooth_transition, transition_samples
 from .band import Band
 from .limit_check import reachable
 from .limits import Limits
@@ -66,15 +66,15 @@ def nearest_path(
     """
     span, middle = float(np.ptp(y)), 0.5 * float(y.min() + y.max())
 
+    at_start = float(model.run([state.inputs[0]], state)[0][0])
+    count = transition_samples(approach, model.sample_period)
+
     def is_whole(path: Array, low_pass: Band | None = band) -> bool:
-        return reachable(model, limits, path, start=state, band=low_pass, approximate=approximate).is_whole
-
-    at_start, count = float(model.run([state.inputs[0]], state)[0][0]), round(approach / model.sample_period)
-
-    def with_approach(path: Array) -> Array:
-        """The path after an approach from the present position of the stage."""
-        way = smooth_transition(at_start, float(path[0]), count)
-        return np.concatenate((way, path))
+        """Whether the path can be reached after an approach from the present position of the stage."""
+        whole = np.concatenate((smooth_transition(at_start, float(path[0]), count), path))
+        return reachable(
+            model, limits, whole, start=state, band=low_pass, approximate=approximate, approach=count
+        ).is_whole
 
     most = span or model.displacement_scale
     low, high = _range(model, limits, state, count)
@@ -82,15 +82,15 @@ def nearest_path(
     for sign, outside in ((1.0, low - float(y.min())), (-1.0, float(y.max()) - high)):
         trials = [NEARLY * outside] if outside > 0.0 else []
         trials += [max(outside, 0.0) + share * most for share in FIRST_TRIALS]
-        shift = _smallest(lambda c, s=sign: is_whole(with_approach(y + s * c)), trials)  # type: ignore[misc]
+        shift = _smallest(lambda c, s=sign: is_whole(y + s * c), trials)  # type: ignore[misc]
         offsets += [] if shift is None else [sign * shift]
-    shrink = _smallest(lambda c: is_whole(with_approach(middle + (1.0 - c) * (y - middle))), FIRST_TRIALS)
+    shrink = _smallest(lambda c: is_whole(middle + (1.0 - c) * (y - middle)), FIRST_TRIALS)
     usual = Band.of(model.sample_period)
 
     def slower(c: float) -> Band:
         return Band(usual.passed * 2.0 ** (-8.0 * c), usual.stopped * 2.0 ** (-8.0 * c), 0.02)
 
-    lower = _smallest(lambda c: is_whole(with_approach(y), slower(c)), FIRST_TRIALS)
+    lower = _smallest(lambda c: is_whole(y, slower(c)), FIRST_TRIALS)
     return NearestPath(
         min(offsets, key=abs, default=None),
         None if shrink is None or shrink >= 1.0 else 1.0 - shrink,

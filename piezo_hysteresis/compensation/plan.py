@@ -28,7 +28,7 @@ from ..model.chain import ChainState
 from ..model.model import Model
 from ..model.samples import samples
 from ..record import Record
-from .approach import APPROACH, settled_start, smooth_transition
+from .approach import APPROACH, settled_start, smooth_transition, transition_samples
 from .band import Band
 from .expected_error import ExpectedError, error_after_drive, free_run_error, parameter_error
 from .inverse import Inverse
@@ -143,7 +143,8 @@ def plan(
     start : ChainState, optional
         State of the model now. Default: at rest at 0 V, or at the limit that is nearest to it.
     approach : float
-        Duration of the smooth approach from the present position to the first sample of the path [s].
+        Duration of the smooth approach from the present position to the first sample of the path [s], at least 200
+        samples; 0 for none.
     way_back : float
         Duration of the smooth return to the voltage at which the drive began [s]; longer if the slew limit requires it.
         Default 0: the last voltage is held.
@@ -168,9 +169,9 @@ def plan(
     state = start or settled_start(model, limits)
     band = band or Band.of(model.sample_period)
     at = float(model.run([state.inputs[0]], state)[0][0])
-    way = smooth_transition(at, float(y[0]), round(approach / model.sample_period))
+    way = smooth_transition(at, float(y[0]), transition_samples(approach, model.sample_period))
     whole = np.concatenate((way, y))
-    found = reachable(model, limits, whole, start=state, band=band, approximate=approximate)
+    found = reachable(model, limits, whole, start=state, band=band, approximate=approximate, approach=way.size)
     if found.parts:  # what is changed is the path alone: the approach begins where the stage is
         nearest = nearest_path(model, limits, y, state, band=band, approximate=approximate, approach=approach)
         found = replace(found, nearest=nearest)

@@ -24,11 +24,13 @@ import pytest
 from benchmarks.other_forms import KINDS, random_stage
 from benchmarks.prediction import fitted_drives, measured
 from piezo_hysteresis.compensation import Limits, plan, reachable
+from piezo_hysteresis.compensation.approach import APPROACH
 from piezo_hysteresis.compensation.expected_error import free_run_error, parameter_error
 from piezo_hysteresis.effects import AmplifierSaturation, AmplifierSlewLimit, Arx, BoucWen, Creep, Effect, ThermalDrift
 from piezo_hysteresis.effects.drive.amplifier_slew_limit_settling import AmplifierSlewLimitSettling
 from piezo_hysteresis.errors import ModelError
 from piezo_hysteresis.identification.identify import identify
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.model.parameter_covariance import ParameterCovariance
 from piezo_hysteresis.record import Experiment
 
@@ -206,6 +208,29 @@ def test_what_is_missed_by_less_than_the_model_knows_is_reachable() -> None:
     assert 1e-9 < max(part.largest for part in parts) < 5e-9
     poor = replace(model, provenance={"free_run_error": "1e-6"})
     assert not reachable(poor, UNIPOLAR, y - 1e-7, start=start).is_whole
+
+
+@pytest.mark.parametrize("amplitude", [2e-9, 20e-9, 2e-6])
+def test_a_small_path_is_not_cut_off_within_the_tolerance_of_a_large_way_to_it(amplitude: float) -> None:
+    """Half of a scan of 40 nm at the highest voltage was cut off, and the plan called it reachable."""
+    model = replace(stage(), provenance={"free_run_error": "3e-8"})
+    way = np.append(5.0 - 5.0 * np.cos(np.pi * np.arange(2500) / 2500.0), np.full(3000, 10.0))
+    top = float(model.run(way, model.rest(0.0))[0][-1])
+    wave = amplitude * np.sin(2.0 * np.pi * 20.0 * PERIOD * np.arange(5000))
+    (part, *_) = plan(model, top + wave, UNIPOLAR).reachability.parts
+    assert part.limit == "voltage_max" and part.largest == pytest.approx(-amplitude, rel=0.05)
+    for level in (0.5 * top, top - 1.01 * amplitude):
+        assert plan(model, level + wave, UNIPOLAR).reachability.is_whole
+
+
+@pytest.mark.parametrize("period", [2e-5, 1e-3, 1e-2])
+def test_the_way_to_a_path_from_the_lowest_voltage_is_reachable_at_every_rate(period: float) -> None:
+    """At 100 Hz the way had 5 samples; the band swung below 0 V, and every path was refused."""
+    model = Model((BoucWen(), Creep(gamma=0.01), Arx(b=[0.3, 0.2], a=[-0.5], delay=1)), period, 10.0, 4e-5)
+    for low, high in ((2e-6, 6e-6), (6e-6, 6.1e-6)):
+        y = low + 0.5 * (high - low) * (1.0 - np.cos(0.02 * np.arange(2000)))
+        for approach in (APPROACH, 2.0 * period):
+            assert plan(model, y, UNIPOLAR, approach=approach).reachability.is_whole
 
 
 @pytest.mark.parametrize("metres", [0.5, 1.0, -1.0, 1e3])

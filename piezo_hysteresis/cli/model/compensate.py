@@ -65,7 +65,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="S",
         type=float,
         default=0.05,
-        help="duration of the approach to the path [s] (default: 0.05)",
+        help="duration of the approach to the path [s], at least 200 samples (default: 0.05)",
     )
     parser.add_argument(
         "--way-back",

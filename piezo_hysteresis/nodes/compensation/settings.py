@@ -41,7 +41,16 @@ COMPENSATION: tuple[Row, ...] = (
         "rms noise of the sensor, at which learning stops; 0: taken from the samples while the drive is held",
         _SOURCE,
     ),
-    Parameter("approach", "t_a", "s", 0.1, 1e-3, 1e3, "duration of the way to the first sample of a path", _SOURCE),
+    Parameter(
+        "approach",
+        "t_a",
+        "s",
+        0.1,
+        1e-3,
+        1e3,
+        "duration of the way to the first sample of a path, at least 200 samples",
+        _SOURCE,
+    ),
     Parameter(
         "way_back",
         "t_b",
