@@ -91,14 +91,15 @@ class Record(Pictured):
         size = self.voltage.size
         put(self, "displacement", channel_samples("displacement", self.displacement, size))
         put(self, "channels", ChannelMapping({n: channel_samples(n, c, size) for n, c in self.channels.items()}))
-        period = float(self.sample_period)
-        if not (np.isfinite(period) and period > 0):
+        put(self, "sample_period", float(self.sample_period))
+        if not 0.0 < self.sample_period < np.inf:
             raise RecordError(f"sample_period: got {self.sample_period!r} s, expected a positive time")
-        put(self, "sample_period", period)
         put(self, "phase", printable(self.phase) or "record")
         for name in ("start_time", "initial_voltage"):
-            if (number := getattr(self, name)) is not None and not np.isfinite(number):
-                raise RecordError(f"{name}: got {number!r}, expected a finite number")
+            if (number := getattr(self, name)) is not None:
+                put(self, name, float(number))  # a number of numpy would be written to a table as np.float64(…)
+                if not np.isfinite(number):
+                    raise RecordError(f"{name}: got {number!r}, expected a finite number")
 
     def __repr__(self) -> str:
         return f"Record({', '.join(self.summary())})"
@@ -170,8 +171,7 @@ class Record(Pictured):
         """
         others = {name: change(values) for name, values in self.channels.items()}
         samples = {"voltage": change(self.voltage), "displacement": change(self.displacement)}
-        fields = {"channels": others, **samples, **fields}
-        return replace(self, **fields)
+        return replace(self, **{"channels": others, **samples, **fields})
 
     def split(self, *boundaries: int) -> tuple[Record, ...]:
         """Cut at the given sample indices; every part but the first continues the one before it."""

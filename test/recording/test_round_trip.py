@@ -189,6 +189,17 @@ def test_a_channel_that_not_every_record_has_comes_back(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", ["folder", "table.csv", "matlab.mat"])
+@pytest.mark.parametrize("number", [np.float64, np.float32, np.asarray])
+def test_a_start_that_was_taken_from_an_array_comes_back(tmp_path, name, number):
+    """A CSV file contained `np.float64(1.5)` and could not be read."""
+    start = {"start_time": number(2.0**31), "initial_voltage": number(1.5)}
+    sent = Record([1.0, 2.0, 1.0], [0.0, 1e-6, 0.0], 1e-3, "triangle", **start)
+    write(Experiment((sent,)), tmp_path / name)
+    (got,) = read(tmp_path / name)
+    assert (got.start_time, got.initial_voltage) == (2.0**31, 1.5)
+
+
+@pytest.mark.parametrize("name", ["folder", "table.csv", "matlab.mat"])
 def test_times_that_count_from_an_epoch_come_back(tmp_path, name):
     u = np.linspace(0.0, 5.0, 200)
     begin = 1.7e9
