@@ -147,7 +147,12 @@ def identify(
     inputs = FitInput(start, records, floors, roles, reach, natural, gauge, report)
     structured = memory and start.hysteresis.memoryless() is not None
     if roles.broadband:
-        found = fit_broadband(inputs, None if delay is None else round(dead), orders)
+        samples = None if delay is None else round(dead)
+        found = fit_broadband(inputs, samples, orders)
+        if undetermined(found.fit) or correlated_pairs(found.fit, INSEPARABLE):
+            # from a loop without loss, to which ringing can lead, no joint fit leads back
+            other = fit_broadband(replace(inputs, start=frame), samples, orders)
+            found = min(found, other, key=lambda outcome: outcome.fit.cost)
         if structured:
             found = fit_structured_broadband(found, inputs, orders)
     elif structured:
