@@ -68,6 +68,14 @@ def test_the_fractional_law_is_a_power_of_time(exponent: float) -> None:
     np.testing.assert_allclose(rises, expected, rtol=0.03)
 
 
+@pytest.mark.parametrize("exponent", [-0.3, 0.1, 0.4])
+def test_the_law_holds_where_relaxations_are_slower_than_all_of_the_bank(exponent: float) -> None:
+    effect = CreepFractional(gamma=0.02, exponent=exponent, tau_min=1e-6, tau_max=1000.0)  # for runs of 10 s
+    y = run(effect, np.ones(10001), 1e-3)
+    expected = 0.02 * gamma(1.0 - exponent) / (exponent * np.log(10.0)) * (100.0**exponent - 10.0**exponent)
+    assert y[10000] - y[1000] == pytest.approx(expected, rel=1e-3)
+
+
 def test_exponential_creep_is_the_transfer_function_of_scipy() -> None:
     c, tau, period = [0.02, 0.01], [0.03, 0.4], 1e-3
     x = np.random.default_rng(3).normal(size=2000).cumsum() * 0.1

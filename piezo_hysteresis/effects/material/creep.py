@@ -33,8 +33,8 @@ REFERENCE_TIME = 0.1
 """Time after a step at which creep is defined as zero [s]."""
 
 LASTING = 100.0
-"""Ratio of the slowest relaxation time to the time T since the stage was at rest. Slower relaxations are left out: in
-the time T they would add 0.002 γ together. With a ratio of 10, 0.02 γ would be missing, which is visible in data."""
+"""Ratio of the slowest relaxation time to the time T since the stage was at rest. Within T, all slower relaxations
+together are a multiple of the slowest one (`slower`). Without them, 0.002 γ would be missing within T."""
 
 PER_DECADE = 2
 """Relaxations per decade of time; with two, the sum deviates from the logarithm by 0.02 % of the creep per decade."""
@@ -53,7 +53,8 @@ class Creep(Effect):
     Notes
     -----
     For any input, the law is computed as a sum of relaxations, two per decade, Eq. (15). Each is exact for an input
-    that is linear between samples. There is no creep outside ``tau_min`` … ``tau_max``. A stage at rest does not creep.
+    that is linear between samples. The slowest one also stands for all that are slower (`slower`); relaxations faster
+    than ``tau_min`` are left out. A stage at rest does not creep.
 
     Examples
     --------
@@ -128,16 +129,36 @@ class Creep(Effect):
         )
 
 
-def settled_mix(tau: Array, weights: Array) -> Array:
+def slower(exponent: float = 0.0) -> float:
+    """Weight of the slowest relaxation if it stands for itself and all slower ones, relative to its own.
+
+    Parameters
+    ----------
+    exponent : float
+        λ [1] of weights that are proportional to τ^λ; below 1.
+
+    Returns
+    -------
+    float
+        Sum of q^k over k ≥ 0 with q = 10^((λ − 1)/2), for two relaxations per decade: at times far below τ, a
+        relaxation is an integral of its input divided by τ.
+    """
+    return 1.0 / (1.0 - 10.0 ** ((exponent - 1.0) / PER_DECADE))
+
+
+def settled_mix(tau: Array, weights: Array, exponent: float = 0.0) -> Array:
     """Weights of the direct path and of the relaxations, with which creep is zero 0.1 s after a step.
 
     Parameters
     ----------
     tau, weights : (s,) ndarray
         Relaxation times [s] and weights of the relaxations.
+    exponent : float
+        λ [1] of the weights beyond the slowest relaxation, which are proportional to τ^λ.
 
     Returns
     -------
     (1 + s,) ndarray
     """
+    weights = np.append(weights[:-1], weights[-1] * slower(exponent))
     return np.append(weights @ np.expm1(-REFERENCE_TIME / tau), weights)

@@ -25,7 +25,7 @@ from ...blocks.relaxation import RelaxationBlock
 from ...parameter import Parameter
 from ..effect import Discretisation, Effect
 from ..invertibility import Invertibility
-from .creep import PER_DECADE, REFERENCE_TIME, Creep, settled_mix
+from .creep import PER_DECADE, REFERENCE_TIME, Creep, settled_mix, slower
 
 
 class CreepFractional(Creep):
@@ -84,8 +84,10 @@ class CreepFractional(Creep):
         tau = self.tau
         ratio = tau / REFERENCE_TIME
         weights = ratio ** self["exponent"] / PER_DECADE
-        by_gamma = settled_mix(tau, weights)
-        by_exponent = self["gamma"] * settled_mix(tau, weights * np.log(ratio))
+        growth = np.log(ratio)
+        growth[-1] += (slower(self["exponent"]) - 1.0) * np.log(10.0) / PER_DECADE
+        by_gamma = settled_mix(tau, weights, self["exponent"])
+        by_exponent = self["gamma"] * settled_mix(tau, weights * growth, self["exponent"])
         names = ("creep_fractional.gamma", "creep_fractional.exponent")
         mix = self["gamma"] * by_gamma
         return RelaxationBlock(names, tau, setting.sample_period, mix, np.vstack((by_gamma, by_exponent)))
