@@ -65,8 +65,8 @@ class Correction:
 
     @property
     def worst(self) -> float:
-        """Largest ratio of the error with the correction to the error without it, over the test records."""
-        return max(p.after / p.before for p in self.gap.per_phase) if self.gap is not None else np.nan
+        """Largest error of a test record with the correction, relative to that without it or to a larger floor."""
+        return max(p.after / max(p.before, p.floor) for p in self.gap.per_phase) if self.gap is not None else np.nan
 
     def sentence(self) -> str:
         """The correction in words."""

@@ -40,7 +40,7 @@ PLAYS = 13
 """Number of plays, whose half widths grow by √2."""
 REMOVES, WORSE = 0.5, 1.05
 """Smallest share of the gap on the test records that a correction must remove, and largest ratio of the error with it
-to the error without it in a test record."""
+to the larger of the error without it and the floor, in a test record."""
 FEW = 10
 """Number of linearisations of a trial; few, because a correction is small and linear in its parameters."""
 

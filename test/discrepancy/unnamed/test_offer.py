@@ -26,6 +26,7 @@ from piezo_hysteresis.blocks.block import Block
 from piezo_hysteresis.blocks.relaxation import RelaxationBlock
 from piezo_hysteresis.discrepancy.diagnose import compare_with_given_model
 from piezo_hysteresis.discrepancy.diagnosis_state import DiagnosisState
+from piezo_hysteresis.discrepancy.gap import PhaseGap
 from piezo_hysteresis.discrepancy.search.baseline_setup import BaselineSetup
 from piezo_hysteresis.discrepancy.unnamed.correction import Correction, without_corrections
 from piezo_hysteresis.discrepancy.unnamed.held_out import held_out
@@ -134,6 +135,13 @@ def test_a_deviation_of_the_position_is_offered_with_its_shape(found: Correction
     assert shape.x[np.argmax(shape.y)] == pytest.approx(0.2 * SCALE, abs=0.04 * SCALE)
     assert "does not state the cause" in found.sentence()
     assert found.answer()["depends_on"] == "position"
+
+
+@pytest.mark.parametrize("before", [0.0, 1e-6])
+def test_an_error_that_stays_below_the_floor_refuses_no_correction(found: Correction, before: float) -> None:
+    """A stage that rests at 0 V has no error without noise; the quotient was no number, or any number."""
+    rest = PhaseGap("rest", 0, before, 2.0 * before, 0.03)
+    assert replace(found, gap=replace(found.gap, per_phase=(rest,))).worst <= 1.0
 
 
 def test_the_corrected_model_is_saved_with_its_range(of_position: BaselineSetup, found: Correction) -> None:
