@@ -143,7 +143,11 @@ class LiveDiagnosis:
         return self.found.verdict is Verdict.NAMED and " + ".join(self.found.names) == update.likeliest
 
     def reason(self) -> str:
-        """Reason of the end."""
+        """Reason of the end, and what the phases so far could not show."""
+        untested = " and ".join(name.replace("_", " ") for name in self.untested)
+        return self._why_ended() + (f" The phases so far could not show {untested}." if untested else "")
+
+    def _why_ended(self) -> str:
         update = self.updates[-1]
         likeliest = update.likeliest.replace("_", " ")
         share = percent(update.probabilities[update.likeliest])

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ...discrepancy.choice.update import percent
 from .table import Table
 
 MOST = 6
@@ -47,11 +48,11 @@ def probability_table(live: Mapping[str, Any]) -> Table:
         (
             f"{update['time_s']:.1f}",
             update["played"],
-            *(f"{100.0 * update['probabilities'].get(name, 0.0):.2f}" for name in names),
+            *(percent(update["probabilities"].get(name, 0.0)) for name in names),
         )
         for update in live["probabilities"]
     )
-    header = ("stage time [s]", "played", *(f"{name.replace('_', ' ')} [%]" for name in names))
+    header = ("stage time [s]", "played", *(name.replace("_", " ") for name in names))
     numeric = frozenset({0, *range(2, 2 + len(names))})
     caption = (
         f"{live['reason']} “None of these” is an effect that the catalogue does not contain. “creep + none of these” "

@@ -14,12 +14,14 @@
 
 """A diagnosis that chooses its own phases and stops when it knows."""
 
+from dataclasses import replace
+
 import pytest
 
 from piezo_hysteresis.discrepancy.choice.live_diagnosis import begin
 from piezo_hysteresis.discrepancy.choice.probabilities import NOTHING
 from piezo_hysteresis.discrepancy.choice.tiers import FAST_TIERS
-from piezo_hysteresis.discrepancy.choice.update import End
+from piezo_hysteresis.discrepancy.choice.update import End, Update
 from piezo_hysteresis.effects import (
     AsymmetricHysteresis,
     Creep,
@@ -31,6 +33,7 @@ from piezo_hysteresis.effects import (
 from piezo_hysteresis.errors import ParameterError
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
 from piezo_hysteresis.record import Experiment
+from piezo_hysteresis.report.tables.probability_table import probability_table
 from piezo_hysteresis.stage.plant import PlantParameters
 from piezo_hysteresis.stage.simulated import SimulatedStage
 
@@ -102,6 +105,16 @@ def test_effects_that_no_drive_within_the_limits_separates_are_undecidable():
     assert "No decision is possible within the limits and 40 s" in last.reason()
     (effect,) = last.found.effects()
     assert {effect["name"], *effect["confusable_with"]} == {*last.separation.rivals}
+
+
+def test_terminal_page_and_node_state_the_same_probability_and_what_no_phase_could_show():
+    """The table said 100.00 % beside > 99.9 %, and only the JSON file named the effects."""
+    likely = Update(12.8, "loops", {"creep": 0.99999, "none of these": 0.00001})
+    live = replace(begin(LIMITS), updates=(likely,), untested=("gain_drift", "thermal_drift"), end=End.SURE)
+    table = probability_table(live.answer())
+    assert "could not show gain drift and thermal drift" in table.note
+    assert "creep is > 99.9 %" in table.note
+    assert table.rows[0][2] == "> 99.9 %"
 
 
 def test_without_more_stage_time_the_answer_is_not_certain():
