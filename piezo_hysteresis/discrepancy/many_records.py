@@ -57,6 +57,8 @@ DIVERGES = (
     "records that were fitted. The gap is that of the fitted records."
 )
 """Reason of the answer if there is no error on the test records."""
+CUT_SHORT = " The time limit ended the search for a structure or a correction that explains more."
+"""Added to the reason of an unexplained gap if no time was left for what follows the search for effects."""
 
 
 def diagnose_many(state: DiagnosisState) -> Diagnosis:
@@ -145,15 +147,20 @@ def _concluded(state: DiagnosisState, setup: BaselineSetup, selection: Selection
         said = named_conclusion(selection, gap)
     conclusion, reason = said
     is_unexplained = conclusion.verdict is Verdict.UNKNOWN and selection.in_time and not diverges
-    structured = _structured(state, setup, first.model) if is_unexplained and given is None else None
+    structured = correction = None
+    if is_unexplained:
+        try:
+            with ending_at(state.end):
+                structured = _structured(state, setup, first.model) if given is None else None
+                correction = None if structured else best_correction(final.model, setup, state.experiment)
+        except TimeSpentError:
+            reason += CUT_SHORT
     if structured is not None:
         identified, gap = structured
         fit, delivered = identified.fit, identified.model
         reason += f" {CHOSEN.format(f'{100 * gap.explained:.0f} %').capitalize()}."
     found = {s.best.effect.public_name() for s in selection.accepted} if falls else set()
     noted = state.experiment.noting(*missing_excitation(state.experiment.records, setup.usable, found))
-    is_open = is_unexplained and structured is None
-    correction = best_correction(final.model, setup, state.experiment) if is_open else None
     return Diagnosis(
         conclusion,
         reason,
@@ -173,7 +180,7 @@ def _structured(state: DiagnosisState, setup: BaselineSetup, published: Model) -
     """The model of `identify` and its gap, if it explains much of what the published model leaves; else None."""
     state.progress("structure", 0.9)
     known = as_conditioning(state.experiment, setup.test_records)
-    with suppress(PiezoError, TimeSpentError), ending_at(state.end):
+    with suppress(PiezoError):
         found = identify(known, held_out=(), memory=True)
         gap = gap_between(published, found.model, setup, setup.tested)
         return (found, gap) if found.structure is not None and gap.explained >= REMOVES else None
