@@ -86,11 +86,12 @@ def start_models(records: Sequence[Record], fitted: Collection[int]) -> Iterator
 def modal_models(model: Model, records: Sequence[Record], fitted: Collection[int]) -> Iterator[Model]:
     """The model with sums of modes as dynamics: from the broadband records of `fitted`, and from all that move.
 
-    Its hysteresis was fitted before. ARX iterations do not find modes far below the sampling rate.
+    Its hysteresis was fitted before. ARX iterations do not find modes far below the sampling rate. A given model
+    without dynamics keeps none.
     """
     experiment = Experiment(tuple(records))
     _, broadband, moving = _telling_dynamics(experiment, roles_of(experiment), fitted)
-    if not broadband:
+    if not broadband or Arx.name not in model:
         return
     for chosen in (broadband, moving) if moving != broadband else (broadband,):
         with suppress(IdentificationError):

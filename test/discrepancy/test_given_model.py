@@ -23,7 +23,7 @@ from benchmarks.nanopositioner import Nanopositioner, growing_sine
 from piezo_hysteresis.discrepancy import diagnose
 from piezo_hysteresis.discrepancy.diagnose import GIVEN_DIVERGES, RESAMPLED
 from piezo_hysteresis.discrepancy.verdict import Conclusion, Verdict
-from piezo_hysteresis.effects import Arx, BoucWen, Softening
+from piezo_hysteresis.effects import Arx, BoucWen, ExtraDelay, ExtraResonance, Softening
 from piezo_hysteresis.errors import DivergenceError
 from piezo_hysteresis.identification.identify import identify
 from piezo_hysteresis.model.model import Model
@@ -64,6 +64,22 @@ def test_a_given_model_that_diverges_is_replaced_by_an_identified_one(frequencie
     found = diagnose(experiment, unstable)
     assert [n.kind for n in found.experiment.notices].count(GIVEN_DIVERGES) == 1
     assert found.gap.after < 0.5
+
+
+def test_the_mode_that_a_given_model_without_dynamics_lacks_is_named():
+    """The command ended with "got no effect 'arx'", after a minute."""
+    period, size, rng = 1e-3, 3000, np.random.default_rng(0)
+    bare = Model((BoucWen(),), period, 10.0, 1e-5)
+    a = np.poly(np.exp(period * 2.0 * np.pi * 60.0 * np.array([-0.05 + 1j, -0.05 - 1j]))).real
+    stage, time = bare.with_effect(Arx(a=a[1:], b=(a.sum(),))), period * np.arange(size)
+    drives = {f"noise_{k}": np.clip(5.0 + 1.5 * rng.normal(size=size), 0.0, 10.0) for k in range(2)}
+    drives |= {f"sine_{f:g}hz": 5.0 - v * np.cos(2.0 * np.pi * f * time) for v, f in ((4, 1), (2, 5), (4, 20))}
+    records = [Record(u, np.zeros(size), period, name) for name, u in drives.items()]
+    answers = zip(records, stage.simulate(records), strict=True)
+    measured = [replace(r, displacement=y + 2e-9 * rng.normal(size=size)) for r, y in answers]
+    found = diagnose(Experiment(tuple(measured)), bare, effects=[ExtraDelay, ExtraResonance])
+    assert "extra_resonance" in found.names
+    assert found.model["extra_resonance"]["f0"] == pytest.approx(60.0, rel=0.01)
 
 
 @pytest.mark.parametrize(("period", "frequencies"), [(1e-4, (1.0, 5.0, 20.0, 60.0)), (5e-5, (1.0, 10.0, 60.0))])
