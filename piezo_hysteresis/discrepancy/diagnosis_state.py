@@ -51,7 +51,10 @@ class DiagnosisState:
 
     @property
     def usable(self) -> list[int]:
-        """Indices of the records that may be compared with a model, and have at least `PIECES` samples."""
+        """Indices of the records that may be compared with a model, without phases that only prepare the stage.
+
+        Records that begin in an unknown state or have fewer than `PIECES` samples are used only if all others do, too.
+        """
         informative = [i for i, r in enumerate(self.experiment) if r.phase not in IDLE]
         whole = [i for i in informative if not self.experiment[i].truncated]
         return [i for i in whole if self.experiment[i].size >= PIECES] or whole or informative

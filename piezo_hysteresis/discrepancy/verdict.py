@@ -131,7 +131,7 @@ def named_conclusion(selection: Selection, gap: Gap) -> tuple[Conclusion, str]:
 def unnamed_conclusion(selection: Selection, falls: bool, gap: Gap) -> tuple[Conclusion, str]:
     """The conclusion and its reason if no effect is named.
 
-    `falls` says whether the effects of the search reduce the gap on the test records.
+    `falls` is False if the effects of the search were judged on the test records and did not reduce the gap there.
     """
     if not selection.in_time:
         return Conclusion.TIME_LIMIT, "No effect is named: the time limit ended the search before an answer was found."

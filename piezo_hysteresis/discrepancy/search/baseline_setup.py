@@ -179,10 +179,10 @@ def _short(
 def better_fit(
     start: Model, found: Fit, score: Score, training_data: TrainingData, share: float = np.inf
 ) -> tuple[Fit, Score]:
-    """A fit and its score, or those from another start if cross-validation and fit are better.
+    """A fit and its score, or those from another start if the fit is better.
 
-    The start is judged first, after one linear step. A start that is not better then, or from which the fit fails, is
-    left out. Cross-validation compares C, or V if only a `share` of V may remain.
+    Cross-validation judges the start first, after one linear step, by C, or by V if only a `share` of V may remain after
+    the fit. A start that is not better then, or from which the fit fails, is left out.
     """
     with suppress(*FAILURES):
         first = scored(start, training_data)
