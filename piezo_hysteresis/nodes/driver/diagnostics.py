@@ -84,10 +84,11 @@ class DriverDiagnostics:
             "stopped": self._latch.is_set,
             "claimed_by": self.claim.owner,
         }
-        if self._latch.is_set and level == DiagnosticStatus.OK:
-            level, message = DiagnosticStatus.WARN, f"stopped, {message}; nothing moves until ~/release"
+        notices = []
+        if self._latch.is_set:
+            notices.append("stopped; nothing moves until ~/release")
         if fault := self._node.recent_fault:
-            level, message = worst(level, DiagnosticStatus.WARN), f"{message}; {fault}"
+            notices.append(fault)
         acquisition = self._acquisition
         if acquisition is not None:
             tally, now = acquisition.tally, time.monotonic()
@@ -95,14 +96,11 @@ class DriverDiagnostics:
             covered = tally.samples + tally.never_measured
             self._seen = (now, covered, tally.postponed, tally.clock_jumps, tally.undated)
             if tally.postponed > postponed:
-                level = DiagnosticStatus.WARN
-                message = f"behind by {tally.postponed - postponed:.3g} s; the stamps moved"
-            elif tally.undated > undated:
-                level = DiagnosticStatus.WARN
-                message = "the clock is after January 2038, later than a message can hold; the stamps stand still"
-            elif tally.clock_jumps > jumps:
-                level = DiagnosticStatus.WARN
-                message = f"the clock jumped by {tally.clock_jumps - jumps:.3g} s; the stamps moved with it"
+                notices.append(f"behind by {tally.postponed - postponed:.3g} s; the stamps moved")
+            if tally.undated > undated:
+                notices.append("the clock is after January 2038, later than a message can hold; the stamps stand still")
+            if tally.clock_jumps > jumps:
+                notices.append(f"the clock jumped by {tally.clock_jumps - jumps:.3g} s; the stamps moved with it")
             values |= {
                 "rate": (covered - samples) / (now - then) if now > then else 0.0,
                 "rate_expected": self._target,
@@ -117,6 +115,8 @@ class DriverDiagnostics:
                 "phase": str(acquisition.playback.phase),
             }
             tally.latest = 0.0
+        if notices:
+            level, message = worst(level, DiagnosticStatus.WARN), "; ".join((message, *notices))
         array = DiagnosticArray(status=[diagnostic(level, self._name, message, stage, **values)])
         array.header.stamp = to_stamp(self._node.get_clock().now().nanoseconds)
         send(self._publisher, array)
