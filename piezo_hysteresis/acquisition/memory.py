@@ -64,8 +64,8 @@ class MemoryAcquisition(StreamingAcquisition):
         super()._run()
 
     def _is_interrupted(self) -> bool:
-        self._keeper.begin_step()
-        return self.playback.is_stopping or self._keeper.is_lost
+        self.keeper.begin_step()
+        return self.playback.is_stopping or self.keeper.is_lost
 
     def _step(self) -> None:
         playback = cast(Playback, self.playback)
@@ -139,7 +139,7 @@ class MemoryAcquisition(StreamingAcquisition):
     def _break_off(self, playback: Playback) -> None:
         """Let the device go to its safe voltage by itself; the samples of this ramp are not read."""
         self._go_safe()
-        self._keeper.require()
+        self.keeper.require()
         with self._access:
             playback.jump(self.stage.description.safe_voltage)
             self._next_target, self._given = None, False

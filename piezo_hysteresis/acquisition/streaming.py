@@ -83,7 +83,7 @@ class StreamingAcquisition:
         self._deliver, self._fail, self._ready = deliver, fail, ready
         self._late = LatencyBuffer(round(stage.description.latency / time_base.sample_period), playback.phase.number)
         self._device_clock = DeviceClock(time_base) if stage.description.latency else None
-        self._latch, self._keeper = latch or StopLatch(), keeper or NoKeeper()
+        self._latch, self.keeper = latch or StopLatch(), keeper or NoKeeper()
         self._open, self._is_abandoned = OpenCommands(), False
         self._access = threading.Lock()  # for the playback: nothing slow is done with it
         self._accepting = threading.Lock()  # until the acceptance is reported; taken before `_access`
@@ -182,8 +182,8 @@ class StreamingAcquisition:
                     return
             self._time_base.anchor(0, *read_together(self._node_clock))
             while not self._halting.is_set():
-                self._keeper.require()
-                self._keeper.begin_step()
+                self.keeper.require()
+                self.keeper.begin_step()
                 was_safe, begin = self.playback.is_safe, self.index
                 self._step()
                 is_safe = self.playback.is_safe
@@ -197,12 +197,12 @@ class StreamingAcquisition:
             self._end_commands(str(failure))
             self._safe.set()
         finally:
-            self._keeper.end_step()
+            self.keeper.end_step()
 
     def _go_safe(self) -> None:
         """Bring the stage to its safe voltage after a keeper that acts has ended, unless the keeper has the stage."""
-        self._keeper.let_finish()
-        if not self._keeper.has_stage:
+        self.keeper.let_finish()
+        if not self.keeper.has_stage:
             self.stage.safe()
 
     def _abandon(self, error: BaseException) -> PiezoError:
@@ -242,7 +242,7 @@ class StreamingAcquisition:
 
     def _wait_until(self, steady: float) -> bool:
         """Wait until a time on the steady clock [s]; returns False if the thread has to end before."""
-        self._keeper.begin_step()
+        self.keeper.begin_step()
         return not self._halting.wait(max(steady - time.monotonic(), 0.0))
 
     def _pass_on(self, first: int, drive: Drive, acquired: Acquired) -> None:

@@ -143,7 +143,7 @@ def test_a_driver_that_is_closed_while_its_keeper_acts_waits_for_it(monkeypatch)
         stage, keeper, ends = s.session.stage, s.session._keeper, []
         close = stage.close
         monkeypatch.setattr(stage, "close", lambda: ends.append(keeper._process.poll()) or close())
-        keeper._until = 0.0  # no further heartbeats
+        keeper.begun = -np.inf  # no further heartbeats
         s.wait(lambda: s.output < 0.9 * TOP, "the keeper")
         s.session.close()
         assert ends == [0], "the keeper had ended before the driver used the stage"

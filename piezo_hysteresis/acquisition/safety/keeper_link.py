@@ -39,18 +39,33 @@ _PER_TIMEOUT = 10
 """Number of heartbeats per time-out of the keeper."""
 
 
-class NoKeeper:
+class _Steps:
+    """The steps of the acquisition, which the keeper limits, and which the diagnostics report when one lasts long."""
+
+    begun = math.inf
+    """Begin of the present step on the clock of `time.monotonic` [s]; infinite outside a step."""
+
+    def begin_step(self) -> None:
+        """Note that a step begins now."""
+        self.begun = time.monotonic()
+
+    def end_step(self) -> None:
+        """Note that the last step has ended."""
+        self.begun = math.inf
+
+
+class NoKeeper(_Steps):
     """Used instead of a `KeeperLink` for a stage without a keeper."""
 
     is_lost = has_stage = False
 
-    def begin_step(self) -> None:
+    def require(self) -> None:
         """Do nothing."""
 
-    end_step = require = let_finish = begin_step
+    let_finish = require
 
 
-class KeeperLink:
+class KeeperLink(_Steps):
     """The keeper process of this driver.
 
     Parameters
@@ -101,7 +116,7 @@ class KeeperLink:
             "driver": os.getpid(),
         }
         self._interval, self._ended, self._is_lost = timeout / _PER_TIMEOUT, threading.Event(), False
-        self._patience, self._until = patience, math.inf
+        self._patience = patience
         self.has_stage = False
         self._process = subprocess.Popen(
             [sys.executable, "-m", "piezo_hysteresis.acquisition.safety.keeper"],
@@ -142,14 +157,6 @@ class KeeperLink:
     def _has_spoken(self) -> bool:
         """Whether the keeper has sent a message (it acts) or has ended."""
         return bool(select.select([self._answers], [], [], 0.0)[0])
-
-    def begin_step(self) -> None:
-        """Begin a step of the acquisition: from now on, heartbeats are sent for `patience` and no longer."""
-        self._until = time.monotonic() + self._patience
-
-    def end_step(self) -> None:
-        """End the last step of the acquisition: heartbeats are sent without limit."""
-        self._until = math.inf
 
     def require(self) -> None:
         """Raise StageError if the keeper acts or has ended."""
@@ -226,7 +233,7 @@ class KeeperLink:
 
     def _beat(self) -> None:
         while not self._ended.wait(self._interval):
-            if time.monotonic() < self._until:
+            if time.monotonic() - self.begun < self._patience:
                 self._send(b".")
 
     def _send(self, text: bytes) -> None:

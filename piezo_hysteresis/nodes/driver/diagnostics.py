@@ -29,6 +29,9 @@ from ..runtime.guarded_node import GuardedNode
 from ..runtime.sending import send
 from ..topics import DIAGNOSTICS, advertise
 
+_LONGEST_CALL = 2.0
+"""Duration of a call of a stage from which it is reported, in addition to two blocks [s]."""
+
 
 def status_name(driver: str) -> str:
     """Name of the status of the driver with this full name."""
@@ -95,6 +98,9 @@ class DriverDiagnostics:
             then, samples, postponed, jumps, undated = self._seen
             covered = tally.samples + tally.never_measured
             self._seen = (now, covered, tally.postponed, tally.clock_jumps, tally.undated)
+            duration = now - acquisition.keeper.begun
+            if duration > _LONGEST_CALL + 2 * acquisition.block_size / self._target:
+                notices.append(f"a call of the stage has not returned for {duration:.3g} s")
             if tally.postponed > postponed:
                 notices.append(f"behind by {tally.postponed - postponed:.3g} s; the stamps moved")
             if tally.undated > undated:

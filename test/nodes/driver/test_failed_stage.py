@@ -59,6 +59,7 @@ def test_a_command_that_a_fault_of_the_device_ends_is_reported_as_stopped(lab):
 def test_a_driver_whose_device_hangs_does_not_claim_safety_nor_use_it_again(lab):
     driver, statuses = rises_to_the_fault(lab, "time.sleep(3600.0)")
     reported = lab.diagnostics()
+    lab.wait(lambda: any("has not returned for" in s.message for a in reported for s in a.status), "the hanging call")
     assert not lab.transition("deactivate")
     assert lab.state() == "unconfigured"
     lab.wait(lambda: any("voltage is unknown" in s.message for a in reported for s in a.status), "the reason")
