@@ -186,8 +186,10 @@ class DriverSession:
 
     def _longest_step(self) -> float:
         """Time within which a working stage reaches its safe voltage and answers every call [s]."""
-        once = self.settings.longest_ramp(self.limits) + self.limits.latency + self._values.get("timeout", 0.0)
-        return 2.0 + 2.0 * (once + self.settings.block_size(self.stage.sample_period) * self.stage.sample_period)
+        settings, period = self.settings, self.stage.sample_period
+        block = settings.block_size(period) * period / settings.real_time_factor
+        once = settings.longest_ramp(self.limits) + self.limits.latency + self._values.get("timeout", 0.0)
+        return 2.0 + 2.0 * (once + block)
 
     def _source(self, stage: Stage) -> Source:
         if isinstance(stage, ReplayStage):

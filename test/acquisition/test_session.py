@@ -276,3 +276,12 @@ def test_a_replay_that_waits_for_subscribers_ends_at_once():
     session.close()
     assert not acquisition.is_running
     assert not failures
+
+
+def test_a_simulated_stage_in_slow_motion_is_brought_to_its_safe_voltage():
+    with device("simulated") as (name, parameters, amplifier, _):
+        s = WiredSession(name, parameters, amplifier, real_time_factor=0.1, block_duration=1.0)
+        s.start()
+        s.acquisition.ramp_to(1.0)
+        s.session.close()
+        assert s.output == 0.0
