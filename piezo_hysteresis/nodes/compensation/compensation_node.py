@@ -36,7 +36,7 @@ from ..messages.phase_text import phase_name
 from ..messages.samples import SampleReader
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.job_actions import JobActions, by_service
-from ..runtime.parameters import declare, read
+from ..runtime.parameters import declare, node_name, read
 from ..runtime.process import run
 from ..runtime.sending import send
 from ..topics import advertise, subscribe
@@ -63,7 +63,7 @@ class CompensationNode(GuardedNode):
         self._values = read(self, COMPENSATION)
         compile_kernels(self.get_logger().info)
         self._status = CompensationStatus(self)
-        self._driver = DriverClient(self, self._values["driver"])
+        self._driver = DriverClient(self, node_name("driver", self._values["driver"]))
         self._error = advertise(self, "tracking_error")
         self._rms = advertise(self, "tracking_rms")
         self._runs = PathRuns(self._driver, self._status, self._values)

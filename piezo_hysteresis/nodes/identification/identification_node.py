@@ -36,7 +36,7 @@ from ...recording.segmentation.decimation import save_decimation
 from ..runtime.fit_process import FitProcess, Job, Outcome
 from ..runtime.guarded_node import GuardedNode
 from ..runtime.job_actions import JobActions, by_service
-from ..runtime.parameters import declare, read
+from ..runtime.parameters import declare, node_name, read
 from ..runtime.process import run
 from .driver_client import DriverClient
 from .experiment_folder import ExperimentFolder, problem_of_saving
@@ -63,7 +63,7 @@ class IdentificationNode(GuardedNode):
         super().__init__("identification_node", allow_undeclared_parameters=True)
         declare(self, IDENTIFICATION)
         read(self, IDENTIFICATION)
-        driver = self.resolve_topic_name(self._value("driver"))
+        driver = self.resolve_topic_name(node_name("driver", self._value("driver")))
         self._lock = StageLock([f"the identification of {driver} in domain {self.context.get_domain_id()}"])
         self._status = IdentificationStatus(self)
         self._driver = DriverClient(self, self._value("driver"))

@@ -21,10 +21,12 @@ from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy.exceptions import InvalidNodeNameException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
+from rclpy.validate_node_name import validate_node_name
 
-from ...errors import ParameterError, PiezoError
+from ...errors import ParameterError, PiezoError, printable
 from ...parameter import Row, Setting
 
 Content = TypeVar("Content")
@@ -74,6 +76,17 @@ def read(node: Node, rows: Iterable[Row], prefix: str = "") -> dict[str, Any]:
         On a value outside its bounds or choices.
     """
     return {row.name: row.check(node.get_parameter(prefix + row.name).value, prefix) for row in rows}
+
+
+def node_name(parameter: str, value: str) -> str:
+    """The value of a parameter that names a node of the same namespace; ParameterError if it is no such name."""
+    try:
+        validate_node_name(value)
+    except InvalidNodeNameException:
+        raise ParameterError(
+            f"{parameter}: got '{printable(value)}', expected the name of a node, without its namespace"
+        ) from None
+    return value
 
 
 def let_change(

@@ -28,9 +28,11 @@ pytestmark = pytest.mark.nodes
     [
         ("driver_node", ["--bogus"], "--bogus"),
         ("compensation_node", ["-p", "model_file:=pipe"], "expected a regular file"),
+        ("compensation_node", ["-p", "driver:=/stage_x/driver_node"], "driver: got '/stage_x/driver_node', expected"),
+        ("identification_node", ["-p", "driver:=a b"], "driver: got 'a b', expected the name of a node"),
         ("identification_node", ["-p", "experiment_root:=~no_such_user/x"], "there is no home folder of that user"),
     ],
-    ids=["unknown argument", "pipe as model file", "home of nobody"],
+    ids=["unknown argument", "pipe as model file", "path as driver", "no name as driver", "home of nobody"],
 )
 def test_a_bad_argument_is_refused_in_one_line(lab, monkeypatch, executable, arguments, reason):
     os.mkfifo(lab.folder / "pipe")
