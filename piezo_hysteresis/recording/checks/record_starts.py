@@ -18,10 +18,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
+from ...errors import RecordingError
 from ...record import Experiment, Notice
 from ..segmentation.phases import steps_named
 from ..table.read_options import ReadOptions
 from .initial_condition_check import departures, is_within_its_loop, steps_from
+from .quality import VOLTAGE_RANGE
 
 _WITHIN = "begins on a branch of its loop: earlier motion is not recorded; a settled stage needs `initial_voltage`"
 """Message about a record that begins in motion on its loop."""
@@ -50,6 +54,11 @@ def checked_starts(experiment: Experiment, options: ReadOptions) -> Experiment:
         As a format read it.
     options : ReadOptions
         Its `initial_voltage` has priority over what the samples suggest.
+
+    Raises
+    ------
+    RecordingError
+        If an initial voltage is larger than that of any piezo stage, and larger than all recorded ones.
     """
     records = experiment.records
     more_notices = []
@@ -59,6 +68,10 @@ def checked_starts(experiment: Experiment, options: ReadOptions) -> Experiment:
     if options.initial_voltage is not None:
         settled = options.initial_voltage
         records = tuple(r if r.continues or r.truncated else replace(r, initial_voltage=settled) for r in records)
+    most = max(VOLTAGE_RANGE[1], *(float(np.abs(r.voltage).max()) for r in records))
+    if strange := [r.initial_voltage for r in records if abs(r.initial_voltage or 0.0) > most]:
+        said = f"got an initial voltage of {strange[0]:g} V, expected {-most:g} to {most:g} V"
+        raise RecordingError(f"{said}; give it by `initial_voltage`")
     midway = {i for i, r in enumerate(records) if is_within_its_loop(r)}
     more_notices += [Notice("truncated", _WITHIN, records[i].phase) for i in sorted(midway)]
     records = tuple(replace(r, truncated=True) if i in midway else r for i, r in enumerate(records))

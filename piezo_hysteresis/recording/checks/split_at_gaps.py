@@ -98,7 +98,8 @@ def split_at_gaps(
         if values.shape != voltage.shape:
             raise RecordError(f"{name}: got {values.size} samples, expected {voltage.size} as in voltage")
     if not PERIODS[0] <= sample_period <= PERIODS[1]:
-        raise RecordError(f"`sample_period`: got {sample_period:g} s, expected {PERIODS[0]:g} to {PERIODS[1]:g} s")
+        said = f"got a sample period of {sample_period:g} s, expected {PERIODS[0]:g} to {PERIODS[1]:g} s"
+        raise RecordError(f"{said}; give it by `sample_period`")
     further, notices = _complete(channels, phase)
     given = {**{name: channels[name] for name in _NEEDED}, **further, _ROW: np.arange(float(voltage.size))}
     rows, breaks, pauses = with_missing_rows(given, breaks or {}, pauses or {})

@@ -57,7 +57,7 @@ def test_phase_may_be_any_numpy_text(tmp_path, phase):
     [
         ({"sample_period": None}, "sample_period"),
         ({"voltage": None}, "voltage"),
-        ({"sample_period": 0.0}, "got 0 s"),
+        ({"sample_period": 0.0}, "period of 0 s"),
         ({"sample_period": [1.0, 2.0]}, "one number"),
         ({"displacement": np.arange(3.0)}, "3 samples"),
         ({"voltage": np.ones((2, 2)), "displacement": np.ones((2, 2))}, "one dimension"),
@@ -135,6 +135,13 @@ def test_keys_units_and_period_of_a_foreign_archive_can_be_named(tmp_path):
     )
     assert record.phase == "triangle" and record.sample_period == 2e-5 and record.initial_voltage == -1.0
     np.testing.assert_array_equal(record.displacement, np.arange(4.0) * 1e-9)
+
+
+@pytest.mark.parametrize(("option", "key"), [(1e300, None), (None, 1e300), (None, -5000.0)])
+def test_an_initial_voltage_that_no_stage_has_is_refused(tmp_path, option, key):
+    np.savez(tmp_path / "01_sine.npz", **keys(**({} if key is None else {"initial_voltage": key})))
+    with pytest.raises(RecordingError, match=r"initial voltage .* expected -1200 to 1200 V"):
+        read(tmp_path, initial_voltage=option)
 
 
 def test_a_first_phase_that_continues_another_is_truncated(tmp_path):
