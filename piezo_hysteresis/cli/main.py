@@ -117,9 +117,9 @@ def _drop_unwritable() -> None:
 
 
 def _parser(chosen: str | None) -> argparse.ArgumentParser:
-    import argparse  # nothing slow is imported before `main` can report an interrupt
+    from .one_line_parser import OneLineParser  # nothing slow is imported before `main` can report an interrupt
 
-    parser = argparse.ArgumentParser(
+    parser = OneLineParser(
         prog="piezo",
         description="Identify models of piezo stages, check them, and find missing physical effects.",
         epilog="exit status: 0 success, also for every verdict of `piezo diagnose`; 1 if the result cannot be trusted, "

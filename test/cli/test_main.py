@@ -55,6 +55,13 @@ def test_every_command_explains_itself(piezo, command):
     assert done.out.startswith(f"usage: piezo {command}")
 
 
+@pytest.mark.parametrize("words", ["", "nosuch", "identify", "identify e --nosuch", "simulate --seed -1"])
+def test_wrong_arguments_are_reported_in_one_line(piezo, words):
+    done = piezo(*words.split())
+    assert (done.status, done.out, done.err.count("\n")) == (2, "", 1)
+    assert done.err.startswith("piezo")
+
+
 def test_an_interrupt_while_a_command_loads_is_reported_in_one_line():
     command = [sys.executable, "-m", "piezo_hysteresis.cli.main", "effects"]
     listing = {**os.environ, "PYTHONPROFILEIMPORTTIME": "1"}

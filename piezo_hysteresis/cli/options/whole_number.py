@@ -20,7 +20,7 @@ import argparse
 
 
 def whole_number(text: str) -> int:
-    """A whole number from 0 on.
+    """A whole number from 0 on, of at most 18 digits.
 
     Raises
     ------
@@ -28,5 +28,5 @@ def whole_number(text: str) -> int:
         On any other text.
     """
     if not (text.isascii() and text.isdecimal() and len(text) <= 18):
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected a whole number from 0 on")
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected a whole number from 0 to 1e18 - 1")
     return int(text)
