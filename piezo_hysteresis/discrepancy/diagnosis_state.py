@@ -51,10 +51,8 @@ class DiagnosisState:
 
     @property
     def usable(self) -> list[int]:
-        """Indices of the records that may be compared with a model, without phases that only prepare the stage.
-
-        Records that begin in an unknown state or have fewer than `PIECES` samples are used only if all others do, too.
-        """
+        """Indices of the records to compare with a model: of the phases that do not only prepare the stage, those that
+        begin in a known state and have at least `PIECES` samples, or all if there are none."""
         informative = [i for i, r in enumerate(self.experiment) if r.phase not in IDLE]
         whole = [i for i in informative if not self.experiment[i].truncated]
         return [i for i in whole if self.experiment[i].size >= PIECES] or whole or informative

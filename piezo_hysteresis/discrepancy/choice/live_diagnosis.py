@@ -122,10 +122,8 @@ class LiveDiagnosis:
         time = self.time + sum(p.duration for p in self.due)
         untested = self._untested_by(found, time)
         by_name = probabilities(found, {e.public_name() for e in self.effects}, untested)
-        update = Update(time, self.due_name, by_name)
-        after = replace(
-            self, time=time, updates=(*self.updates, update), found=found, separation=None, untested=untested
-        )
+        updates = (*self.updates, Update(time, self.due_name, by_name))
+        after = replace(self, time=time, updates=updates, found=found, separation=None, untested=untested)
         return after._decided()
 
     @property
@@ -163,6 +161,7 @@ class LiveDiagnosis:
 
     def answer(self) -> dict[str, Any]:
         """The part ``live`` of ``answer.json``."""
+        closest = self.separation if self.end is End.UNDECIDABLE else None
         return {
             "end": None if self.end is None else str(self.end),
             "reason": self.reason(),
@@ -172,13 +171,8 @@ class LiveDiagnosis:
                 {"time_s": round(u.time, 6), "played": u.played, "probabilities": u.probabilities} for u in self.updates
             ],
             "untested": list(self.untested),
-            "undecidable": None
-            if self.end is not End.UNDECIDABLE or self.separation is None
-            else {
-                "rivals": list(self.separation.rivals),
-                "drive": self.separation.drive,
-                **self.separation.numbers(),
-            },
+            "undecidable": closest
+            and {"rivals": list(closest.rivals), "drive": closest.drive, **closest.numbers()},
         }
 
     @property
