@@ -21,7 +21,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -167,5 +166,5 @@ class Baseline:
                     for k, s in held.items()
                 }
                 return cls(scatter, str(file["model"]), float(file["sample_period"]))
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+        except Exception as error:  # zipfile, zlib and numpy raise errors of many kinds on a damaged file
             raise ModelError(f"{path}: got no baseline of the change watch ({error}); take a new one") from None

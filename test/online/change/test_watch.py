@@ -309,6 +309,18 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path, content):
         Baseline.load(path)
 
 
+@pytest.mark.parametrize(("byte", "value"), [(8, 1), (10, 19), (10, 8)], ids=["flag", "unknown method", "other method"])
+def test_a_damaged_baseline_is_refused(tmp_path, byte, value):
+    watch, _ = unchanged()
+    path = tmp_path / "baseline.npz"
+    watch.baseline.save(path)
+    content = bytearray(path.read_bytes())
+    content[content.index(b"PK\x01\x02") + byte] = value  # in the directory of the archive
+    path.write_bytes(content)
+    with pytest.raises(ModelError, match="take a new one"):
+        Baseline.load(path)
+
+
 def test_a_baseline_of_an_earlier_version_is_refused(tmp_path):
     watch, _ = unchanged()
     path = tmp_path / "baseline.npz"
