@@ -107,3 +107,13 @@ def test_a_text_under_the_name_of_an_array_is_called_that(tmp_path, name):
             reader(tmp_path / name)
         assert name in str(refused.value)
         assert "pickle" not in str(refused.value) and "unsafely" not in str(refused.value)
+
+
+@pytest.mark.parametrize("method", [8, 19])
+def test_a_damaged_path_is_refused_in_one_line(tmp_path, method):
+    np.savez(tmp_path / "a.npz", displacement=np.zeros(5))
+    content = bytearray((tmp_path / "a.npz").read_bytes())
+    content[content.index(b"PK\x01\x02") + 10] = method  # compression in the directory of the archive
+    (tmp_path / "a.npz").write_bytes(content)
+    with pytest.raises(RecordingError, match=r"a\.npz: no NPZ file that can be read \(.*\), expected numbers"):
+        read_path(tmp_path / "a.npz")
