@@ -167,7 +167,7 @@ class Description:
         if not inside.all():
             first = int(np.argmin(inside))
             raise StageError(
-                f"{self.name}: drive sample {first} is {block[first]:.9g} V, expected {self.voltage_min:g} to "
+                f"{self.name}: drive sample {first} is {float(block[first])} V, expected {self.voltage_min:g} to "
                 f"{self.voltage_max:g} V; nothing was played"
             )
         if math.isfinite(self.max_slew_rate):

@@ -77,9 +77,11 @@ def test_set_points_outside_are_refused(voltage):
         CHECK.set_point(voltage)
 
 
-def test_a_set_point_that_is_a_rounding_error_too_high_is_stated_in_full():
+def test_a_voltage_that_is_a_rounding_error_too_high_is_stated_in_full():
     """'got 10 V, expected 0 to 10 V' was said of it."""
     too_high = float(np.nextafter(10.0, 11.0))
+    with pytest.raises(StageError, match=f"sample 0 is {too_high!r} V, expected 0 to 10 V"):
+        CHECK.waveform(np.array([too_high]), 0, 0)
     with pytest.raises(StageError, match=f"got {too_high!r} V, expected 0 to 10 V"):
         CHECK.set_point(too_high)
 
