@@ -92,6 +92,13 @@ def scan(low=0.2, high=0.7, frequency=5.0, duration=0.6):
     return STROKE * (low + (high - low) * 0.5 * (1.0 - np.cos(2 * np.pi * frequency * t)))
 
 
+def test_a_node_with_a_model_file_does_not_wait_for_a_model(lab):
+    statuses = lab.listen(DiagnosticStatus, "status", STATUS)
+    lab.start(NODE, model_file=str(save(MODEL, lab.folder / "model.yaml")))
+    lab.wait(lambda: statuses, "the first status")
+    assert statuses[0].message == "nothing was asked for since the start"
+
+
 def test_the_stage_follows_a_trajectory_and_learning_makes_it_better(lab):
     wrong = MODEL.with_values({"bouc_wen.p2": 1.05 * MODEL.values()["bouc_wen.p2"]})
     node = Compensation(lab, wrong, sensor_noise=NOISE)

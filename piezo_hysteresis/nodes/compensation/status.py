@@ -53,7 +53,7 @@ class CompensationStatus:
         self.listener: Callable[[DiagnosticStatus], None] = lambda status: None
         self.refused = 0
         self._shown = DiagnosticStatus()
-        self.show("idle", "waiting for a model and a trajectory")
+        self.show("idle", "nothing was asked for since the start")
         node.create_timer(1.0, self._repeat, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def show(
