@@ -92,6 +92,15 @@ def test_a_constant_error_is_predicted_by_its_own_size() -> None:
     assert left == pytest.approx(1e-8, rel=1e-9)
 
 
+@pytest.mark.parametrize("size", [1, 2, 3, 6])
+def test_the_error_of_a_path_of_few_samples_is_corrected_where_it_is_above_the_noise(size: int) -> None:
+    correction, left, now = LearningFilter(PERIOD, gain=0.9).correct(np.full(size, 1e-7), 1e-9)
+    assert correction == pytest.approx(np.full(size, 0.9e-7), rel=0.01)
+    assert left < 0.2 * now < 0.21e-7
+    correction, _, _ = LearningFilter(PERIOD).correct(np.full(size, 1e-10), 1e-9)
+    assert not correction.any()
+
+
 def test_what_a_round_is_predicted_to_leave_contains_the_noise() -> None:
     """A path that lies 0.1 % of its range beside the wanted one, and noise of 0.05 %: 0.014 % were predicted."""
     model, noise = stage(), 5e-4 * np.ptp(WANTED)
