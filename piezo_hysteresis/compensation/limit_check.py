@@ -93,12 +93,14 @@ def reachable(
     bad = np.flatnonzero(np.abs(off) > allowed)
     lowest, direction = _at_the_lowest_voltage(model, limits)
     settling = np.full(max(round(APPROACH / model.sample_period), limited.preview, 1), limits.voltage_min)
+    steps = np.diff(needed, prepend=state.inputs[0])
     parts, moved, played = [], state, 0
     for a, b in _runs(bad, max(1, round(2e-3 / model.sample_period))):
         worst = a + int(np.abs(off[a : b + 1]).argmax())
         tolerance = float(allowed[worst])
         kept = direction * (float(aim[worst]) - lowest) >= -tolerance
-        part = _part(model, limits, needed[a : b + free.preview + 1], a, b + 1, float(off[worst]))
+        along = slice(a, b + free.preview + 1)
+        part = _part(model, limits, needed[along], steps[along], a, b + 1, float(off[worst]))
         if no_voltage[worst]:
             part = replace(part, limit="model", other_limits=())
         if kept and part.limit == "voltage_min":  # a drive that is only too late would still get there
@@ -153,11 +155,13 @@ def _runs(indices: NDArray[np.intp], gap: int) -> list[tuple[int, int]]:
     return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
 
 
-def _part(model: Model, limits: Limits, needed: Array, begin: int, end: int, largest: float) -> UnreachablePart:
-    """The part from sample `begin` to `end`, that would need the drive `needed` [V]."""
+def _part(
+    model: Model, limits: Limits, needed: Array, steps: Array, begin: int, end: int, largest: float
+) -> UnreachablePart:
+    """The part from sample `begin` to `end`, that would need the drive `needed` with the `steps` to its samples [V]."""
     period = model.sample_period
     low, high = float(needed.min()), float(needed.max())
-    slew = float(np.abs(np.diff(needed)).max(initial=0.0)) / period
+    slew = float(np.abs(steps).max()) / period
     beyond = {
         "voltage_min": limits.voltage_min - low,
         "voltage_max": high - limits.voltage_max,

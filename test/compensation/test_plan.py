@@ -155,6 +155,17 @@ def test_every_limit_that_a_part_exceeds_is_named() -> None:
     assert {(part.limit, part.other_limits) for part in slower} == {("voltage_max", ())}
 
 
+@pytest.mark.parametrize("begin", [0, 500])
+def test_a_step_is_said_to_be_too_fast_by_the_slope_that_it_needs(begin: int) -> None:
+    """The slope to the first sample of a part did not count: a step needed "0 V/s, above max_slew_rate"."""
+    model = Model((BoucWen(), Arx(b=[0.5])), PERIOD, 10.0, 4e-5)
+    top = float(model.run([5.0, 5.0], model.rest(0.0))[0][-1])
+    y = np.where(np.arange(1000) < begin, 0.0, top)
+    (part,) = reachable(model, Limits(0.0, 10.0, 1e4), y).parts
+    assert part.limit == "max_slew_rate" and part.begin == pytest.approx(begin * PERIOD)
+    assert part.needed_slew == pytest.approx(5.0 / PERIOD, rel=0.01)
+
+
 @pytest.mark.parametrize(
     "limit",
     [AmplifierSaturation(upper=4.5), AmplifierSlewLimit(S=300.0), AmplifierSlewLimitSettling(S=300.0, tau=1e-4)],
