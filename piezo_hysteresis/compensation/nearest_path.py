@@ -88,7 +88,7 @@ def nearest_path(
     usual = Band.of(model.sample_period)
 
     def slower(c: float) -> Band:
-        return Band(usual.passed * 2.0 ** (-8.0 * c), usual.stopped * 2.0 ** (-8.0 * c), 0.02)
+        return Band(usual.passed * 2.0 ** (-8.0 * c), usual.stopped * 2.0 ** (-8.0 * c), 5.0 * usual.length)
 
     lower = _smallest(lambda c: is_whole(y, slower(c)), FIRST_TRIALS)
     return NearestPath(

@@ -370,3 +370,15 @@ def test_the_nearest_band_is_reachable_and_not_much_lower_than_it_must_be(seed: 
     assert f"components above {band:.3g} Hz are removed" in found.nearest.conditions()
     assert reachable(model, limits, below(band)).is_whole
     assert not reachable(model, limits, below(2.5 * band)).is_whole
+
+
+@pytest.mark.parametrize("period", [PERIOD, 1e-3, 1e-2])
+def test_the_nearest_band_is_found_at_every_rate(period: float) -> None:
+    """The band of the search was 0.02 s long at every rate: 20 samples at 1 kHz, and none was found."""
+    model, k = Model((BoucWen(), Arx(b=[0.5])), period, 10.0, 4e-5), np.arange(2000)
+    slow = 4e-6 - 3e-6 * np.cos(2.0 * np.pi * k / 2000.0)
+    limits = Limits(0.0, 10.0, 0.02 / period)
+    fast = slow + 0.5e-6 * np.sin(2.0 * np.pi * k / 40.0)
+    nearest = plan(model, fast, limits, approach=3000.0 * period).reachability.nearest
+    assert nearest is not None and nearest.band is not None
+    assert nearest.band * period == pytest.approx(0.016, rel=0.1)
