@@ -32,6 +32,7 @@ from ..effects import (
     Creep,
     CreepFractional,
     CreepTwoRates,
+    Effect,
     ExtraDelay,
     ExtraResonance,
     Offset,
@@ -241,7 +242,12 @@ def delay_of(model: Model) -> float:
 
 
 def with_low_pass(model: Model, tau: float, zeta: float | None = None) -> Model:
-    """The model with a low-pass of the sensor slower by `tau` [s], of second order with a damping ratio."""
-    name = SensorBandwidth.name if zeta is None else SecondOrderLowPass.name
-    tau += model[name]["tau"] if name in model else 0.0
-    return model.with_effect(SensorBandwidth(tau=tau) if zeta is None else SecondOrderLowPass(tau=tau, zeta=zeta))
+    """The model with a low-pass of the sensor with time constant `tau` [s], of second order with a damping ratio.
+
+    One that the model has keeps its poles and its damping ratio, and is slower by the lag of the new one.
+    """
+    new: Effect = SensorBandwidth(tau=tau) if zeta is None else SecondOrderLowPass(tau=tau, zeta=zeta)
+    if new.name in model and not model[new.name].is_off:
+        old, form = model[new.name], "poles" if zeta is None else "zeta"
+        new = old.with_values(tau=old["tau"] + tau * new[form] / old[form])
+    return model.with_effect(new)

@@ -17,9 +17,10 @@
 import numpy as np
 import pytest
 
+from piezo_hysteresis.changes.change_kinds import KINDS
 from piezo_hysteresis.changes.recalibration import recalibrate
 from piezo_hysteresis.changes.signatures import delay_of, shaped_model
-from piezo_hysteresis.effects import Arx, BoucWen, ExtraDelay
+from piezo_hysteresis.effects import Arx, BoucWen, ExtraDelay, SecondOrderLowPass, SensorBandwidth
 from piezo_hysteresis.errors import ParameterError
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Experiment, Record
@@ -74,6 +75,17 @@ def test_no_lag_is_said_that_no_model_has():
 def test_a_later_model_is_later_by_what_was_asked(late):
     old = model(4, 0.2)
     assert delay_of(shaped_model(old, "delay", late * PERIOD)) == pytest.approx(delay_of(old) + late * PERIOD)
+
+
+@pytest.mark.parametrize("key", ["low_pass", "low_pass_2", "low_pass_poles"])
+@pytest.mark.parametrize("before", [(), (SensorBandwidth(tau=3e-4, poles=3), SecondOrderLowPass(tau=5e-4, zeta=0.5))])
+def test_a_low_pass_makes_a_model_later_by_its_own_lag(key, before):
+    """A filter of another form replaced the one that the model had, and the model became earlier."""
+    old, step = model(4), 5.0 * (np.arange(2000) > 0)
+    for effect in before:
+        old = old.with_effect(effect)
+    y, later = (m.simulate(step) for m in (old, shaped_model(old, key, 5e-4)))
+    assert PERIOD * np.sum(y - later) / y[-1] == pytest.approx(KINDS[key].lag * 5e-4, rel=1e-6)
 
 
 def test_a_model_earlier_than_its_delay_is_refused():
