@@ -29,6 +29,7 @@ from ..errors import RecordingError
 from ..model.model import Model
 from ..online.change.score import GROUPS, loop_heights
 from .group_fit import SURE, GroupFit
+from .signatures import delay_of
 
 FILE = "recalibrations.csv"
 """Name of the file."""
@@ -125,10 +126,10 @@ def _number(model: Model, group: str, offset: float) -> tuple[str, str, float, f
             return name, model.row(name).unit, value, value
         return f"{model.hysteresis.name}, height", "1", 1.0, 1.0
     if group == "dynamics":
+        delay, extra = f"{Arx.name}.delay", f"{ExtraDelay.name}.tau"
         if Arx.name in model and ExtraDelay.name not in model:
-            name = f"{Arx.name}.delay"
-            return name, "samples", model.values()[name], 1.0 / model.sample_period
-        return f"{ExtraDelay.name}.tau", "s", model[ExtraDelay.name]["tau"] if ExtraDelay.name in model else 0.0, 1.0
+            return delay, "samples", model.values()[delay], 1.0 / model.sample_period
+        return f"{delay} + {extra}" if Arx.name in model else extra, "s", delay_of(model), 1.0
     return "offset", "m", offset, 1.0
 
 

@@ -16,17 +16,23 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from piezo_hysteresis.changes.group_fit import GroupFit
+from piezo_hysteresis.changes.moved_group import changed_by
 from piezo_hysteresis.changes.recalibration_history import (
     FILE,
     RecalibratedNumber,
     Recalibrations,
+    numbers_of,
     read_numbers,
     write_numbers,
 )
 from piezo_hysteresis.cli.main import main
+from piezo_hysteresis.effects import Arx, BoucWen, ExtraDelay
 from piezo_hysteresis.errors import RecordingError
+from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.report.recalibrations import recalibrations
 
 GAIN = RecalibratedNumber(
@@ -51,6 +57,17 @@ def test_an_invalid_history_is_refused_in_one_line(text):
     with pytest.raises(RecordingError, match="expected") as refused:
         read_numbers(text, "a file")
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("extra", [(), (ExtraDelay(tau=1e-5),)])
+def test_the_lag_of_the_history_is_that_of_the_new_model(extra):
+    """A model with both delays got an earlier one in its dynamics, and the history said a negative extra delay."""
+    old, change = Model((BoucWen(), Arx(b=[0.3], delay=4.0), *extra), 2e-5), np.array([0.0, 0.0, -3e-5, 0.0, 0.0])
+    fit = GroupFit(changed_by(old, change), 0.0, ("dynamics",), change, 0.1 * np.abs(change), 3e-8, 1e-8, 1e-8, 30.0)
+    (row,) = numbers_of(old, 0.0, fit, "2026-11-20T10:00:00Z", 2.0, ("sha256:1", "sha256:2"))
+    (now,) = numbers_of(fit.model, 0.0, fit, "2026-11-21T10:00:00Z", 2.0, ("sha256:2", "sha256:3"))
+    assert (now.parameter, now.old) == (row.parameter, pytest.approx(row.new))
+    assert 0.0 < row.low < row.new < row.high
 
 
 def test_every_number_has_a_panel_that_begins_with_its_old_value():
