@@ -78,6 +78,12 @@ class ChangeKind:
         return 0.0 if self.family != "lag" else 2.0 * self.damping or 1.0
 
     @property
+    def cut_off(self) -> float:
+        """Frequency at which a filter halves the power, in units of 1/(2π size)."""
+        wide = 1.0 - 2.0 * self.damping**2
+        return float(np.sqrt(wide + np.hypot(wide, 1.0))) if self.damping else 1.0
+
+    @property
     def is_filter(self) -> bool:
         """Whether the size is the time constant of a filter."""
         return self.parameter == "tau" and self.name != ExtraDelay.name

@@ -39,7 +39,7 @@ def sentence_of(change: ParameterChange) -> str:
     numbers = change.size, *change.time_constants
     size = _with_interval([abs(n) for n in numbers] if change.key == "delay" else numbers, kind.unit)
     if kind.is_filter:
-        size += f", cut-off frequency {0.5 / np.pi / change.size:.4g} Hz"
+        size += f", cut-off frequency {0.5 / np.pi * kind.cut_off / change.size:.4g} Hz"
     words = [kind.words.format(how="later" if change.size > 0.0 else "earlier", size=size)]
     words += [KINDS[key].words.format(size=_with_interval(also, KINDS[key].unit)) for key, also in change.also.items()]
     late = f" It delays slow signals by {_with_interval(change.lag, 's')}." if "lag" in change.parameters else ""

@@ -35,13 +35,13 @@ class SecondOrderLowPass(Effect):
     Parameters
     ----------
     tau : float
-        Time constant 1/(2π·cut-off frequency) [s].
+        Time constant 1/(2π·natural frequency) [s]; for Butterworth, this is the cut-off frequency (−3 dB).
     zeta : float
         Damping ratio [1].
 
     Notes
     -----
-    The block is exact for an input that is linear between samples. A filter with a cut-off frequency above 0.45 cycles
+    The block is exact for an input that is linear between samples. A filter with a natural frequency above 0.45 cycles
     per sample is replaced by a delay of 2 ζ τ.
     """
 
