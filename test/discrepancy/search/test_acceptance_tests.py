@@ -116,7 +116,7 @@ def test_an_effect_at_the_floor_must_be_larger_than_the_uncertainty_of_the_form(
         ((0.2, 0.3, 0.2, 1.2, 58.0), (1.0,) * 5, False),
         ((0.2, 0.3, 9.0, 7.0, 0.2), (1.0,) * 5, False),
         ((5e-3, 7e-3, 0.6, 29.0, 40.0, 4.4, 6.0), (1.0,) * 7, False),
-        ((0.2, 60.0), (1.0,) * 2, True),
+        ((0.2, 0.2, 60.0), (1.0,) * 3, True),
     ],
     ids=["mains", "noisy fast records", "one drive", "two drives", "fast drives", "too few records"],
 )
@@ -133,6 +133,17 @@ def test_hum_has_the_same_amplitude_whatever_the_drive_does(amplitudes, floors, 
     hum = replace(hum, training_data=data, fit=replace(hum.fit, nuisances=free), score=scored(*np.ones(len(floors))))
     before = np.sqrt(1.0 + 0.5 * (np.square(amplitudes) + 0.02) / np.square(floors))
     assert is_steady(hum, scored(*before)) is steady
+
+
+@pytest.mark.parametrize(("size", "period"), [(30, 1e-3), (1000, 1e-2)], ids=["short", "averaged"])
+def test_records_that_are_too_short_or_too_slow_for_hum_do_not_deny_it(size, period):
+    shows, hides = (Record(np.zeros(n), np.zeros(n), t) for n, t in ((1000, 1e-3), (size, period)))
+    amplitudes = np.array([10.0] * 5 + [0.0] * 5)
+    hum = fitted(MainsHum(), (), np.empty((0, 0)))
+    free = tuple(np.array([0.0, a, 0.0, 0.0, 0.0, 0.0, 0.0]) for a in amplitudes)
+    data = TrainingData((shows,) * 5 + (hides,) * 5, np.ones(10), EXTENT)
+    hum = replace(hum, training_data=data, fit=replace(hum.fit, nuisances=free), score=scored(*np.ones(10)))
+    assert is_steady(hum, scored(*np.sqrt(1.0 + 0.5 * amplitudes**2)))
 
 
 @pytest.mark.parametrize("noise", [0.0, 4e-3])
@@ -175,3 +186,11 @@ def test_a_law_with_one_number_more_must_gain_visibly_over_one_that_reaches_the_
     simpler = fitted(Creep(gamma=0.01), ("creep.gamma",), np.eye(1))
     simpler = replace(simpler, score=Score(np.array([simple, *[others] * 9]), np.zeros(1)))
     assert simplest([best, simpler]).name == law
+
+
+@pytest.mark.parametrize(("error", "effect"), [(1.004, "gain_drift"), (1.03, "creep_fractional")], ids=["tie", "lead"])
+def test_of_two_effects_that_differ_by_chance_the_one_with_fewer_numbers_is_taken(error, effect):
+    names = ("creep_fractional.gamma", "creep_fractional.exponent")
+    best = replace(fitted(CreepFractional(gamma=0.01, exponent=0.05), names, np.eye(2)), score=scored(1.0, 1.0))
+    other = replace(fitted(GainDrift(g=0.05, tau=600.0), ("gain_drift.g",), np.eye(1)), score=scored(error, error))
+    assert simplest([best, other]).name == effect
