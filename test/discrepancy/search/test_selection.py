@@ -119,6 +119,22 @@ def test_a_search_begins_again_from_the_model_that_was_refitted_without_a_refuse
     assert found.score.excess < ADEQUATE
 
 
+@pytest.mark.parametrize(
+    ("behind", "confusable"),
+    [((1.0, 0.0, 0.0, 0.0, 0.0, 0.0), True), ((0.2,) * 6, False), ((9.0, 0.0, 0.0, 0.0, 0.0, 0.0), False)],
+    ids=["chance", "in all records", "a large part of the gain"],
+)
+def test_an_effect_is_confusable_if_chance_explains_a_small_lag_behind_the_best(monkeypatch, behind, confusable):
+    (step,) = steps_with((CREEP,), (CREEP,))
+    best, rival, before = (
+        replace(step.best, effect=effect, score=Score(np.exp(0.5 * np.array(logs)), np.empty(0)))
+        for effect, logs in ((step.best.effect, (0.0,) * 6), (DRIFT, behind), (CREEP, (4.0,) * 6))
+    )
+    monkeypatch.setattr(selection, "_best_effect", lambda *_: ([best, rival], best, None))
+    found = select(step.best.fit.model.without(CREEP.name), best.training_data, before.score, [Creep, ThermalDrift])
+    assert (found.accepted[0].confusable_with == (DRIFT.name,)) is confusable
+
+
 def test_what_explains_too_little_of_an_error_at_the_floor_for_a_name_is_not_fitted_further(monkeypatch):
     """With less noise than its floor, the error that creep leaves is a misfit, which has no name."""
     (step,) = steps_with((CREEP,), (CREEP.with_values(gamma=5e-4),))
