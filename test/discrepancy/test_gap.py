@@ -17,7 +17,7 @@
 import numpy as np
 import pytest
 
-from piezo_hysteresis.discrepancy.gap import measure_gap
+from piezo_hysteresis.discrepancy.gap import Gap, PhaseGap, measure_gap
 from piezo_hysteresis.effects import Arx, BoucWen, Offset
 from piezo_hysteresis.model.model import Model
 from piezo_hysteresis.record import Record
@@ -80,3 +80,13 @@ def test_the_share_is_measured_on_the_records_of_the_gap(records):
     gap = measure(records, (far, near), (0,))
     assert gap.explained == pytest.approx(1.0 - np.sqrt((second - 1.0) / (first - 1.0)))
     assert measure(records, (far, MODEL), (0,)).explained == 1.0
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "falls"),
+    [(4.0, 3.8, False), (4.0, 3.4, True), (1.2, 1.19, True), (1.2, 1.2, False)],
+    ids=["too little", "enough", "little at the floor", "nothing at the floor"],
+)
+def test_a_gap_above_the_floor_falls_if_a_tenth_of_the_squares_is_removed(before, after, falls):
+    row = PhaseGap("sine", 0, np.sqrt(before), np.sqrt(after), 1.0)
+    assert Gap(row.before, row.after, 1.0, None, (row,), True, row.after).falls is falls

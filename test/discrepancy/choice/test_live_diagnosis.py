@@ -16,11 +16,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from piezo_hysteresis.discrepancy.choice import live_diagnosis
 from piezo_hysteresis.discrepancy.choice.live_diagnosis import begin
 from piezo_hysteresis.discrepancy.choice.probabilities import NOTHING
 from piezo_hysteresis.discrepancy.choice.tiers import FAST_TIERS
+from piezo_hysteresis.discrepancy.choice.time_to_decide import Separation
 from piezo_hysteresis.discrepancy.choice.update import End, Update
 from piezo_hysteresis.effects import (
     AsymmetricHysteresis,
@@ -32,6 +35,7 @@ from piezo_hysteresis.effects import (
 )
 from piezo_hysteresis.errors import ParameterError
 from piezo_hysteresis.identification.protocol.drive_limits import DriveLimits
+from piezo_hysteresis.identification.protocol.phases import ProtocolPhase
 from piezo_hysteresis.record import Experiment
 from piezo_hysteresis.report.tables.probability_table import probability_table
 from piezo_hysteresis.stage.plant import PlantParameters
@@ -115,6 +119,22 @@ def test_terminal_page_and_node_state_the_same_probability_and_what_no_phase_cou
     assert "could not show gain drift and thermal drift" in table.note
     assert "creep is > 99.9 %" in table.note
     assert table.rows[0][2] == "> 99.9 %"
+
+
+@pytest.mark.parametrize(("count", "most"), [(2, 4), (3, 4), (4, 0)])
+def test_drives_are_chosen_for_two_or_three_rivals_and_end_if_they_do_not_decide(monkeypatch, count, most):
+    """Chosen drives that decide by prediction and not by measurement would go on until the stage time is over."""
+    drive = ProtocolPhase("noise", np.zeros(10), PERIOD)
+    sure = Separation(("creep", "thermal_drift"), "noise", 1, drive.duration, 9.0, 3.0)
+    monkeypatch.setattr(live_diagnosis, "rivals_of", lambda *_: [None] * count)
+    monkeypatch.setattr(live_diagnosis, "best_drive", lambda *_: ((drive,), sure))
+    live = begin(LIMITS)
+    undecided = Update(80.0, "noise", {"creep": 0.5, "thermal_drift": 0.5})
+    live = replace(live, tier=len(live.plan), updates=(undecided,), time=sum(t.duration for t in live.plan))
+    chosen = 0
+    while (live := live._decided()).due:
+        chosen += 1
+    assert chosen == most and live.end is End.EXHAUSTED
 
 
 def test_without_more_stage_time_the_answer_is_not_certain():

@@ -15,6 +15,7 @@
 """Probabilities of the explanations, and the next drive."""
 
 import math
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,7 @@ from piezo_hysteresis.discrepancy.choice.probabilities import (
 )
 from piezo_hysteresis.discrepancy.choice.tiers import spare_drives, tiers
 from piezo_hysteresis.discrepancy.choice.time_to_decide import (
+    ERROR_RATE,
     ONE_RECORD,
     best_drive,
     expected_log_odds,
@@ -99,7 +101,14 @@ def test_equal_evidence_leaves_the_prior(before, ratios):
 def test_no_record_decides_alone(count, index, ratio):
     other = np.ones(count)
     other[index % count] = ratio
-    assert log_odds(score(np.ones(count)), score(other)) <= ONE_RECORD
+    needed = missing_log_odds({"creep": 0.5, "thermal_drift": 0.5}, ERROR_RATE)
+    assert log_odds(score(np.ones(count)), score(other)) <= ONE_RECORD < needed
+
+
+def test_before_any_evidence_nothing_has_most_and_all_effects_share_a_half():
+    unsearched = SimpleNamespace(selection=None)
+    told = probabilities(unsearched, {"creep", "thermal_drift", "backlash", "mains_hum"})
+    assert told == pytest.approx(PRIOR)
 
 
 def test_an_error_below_the_floor_is_not_evidence():
