@@ -62,11 +62,12 @@ def unit_of(title: str, channel: str, given: Collection[str]) -> str | None:
     Raises
     ------
     RecordingError
-        If the title of a displacement ends in another unit in brackets, e.g. volts, and `given` lacks the channel.
+        If the title of a displacement ends in another unit, e.g. volts, and `given` lacks the channel.
     """
     words = title.strip().strip('#"').strip()
     match = _UNIT.search(words)
-    unit = (match[1] if match else None) or ""
+    ending = (match[2] if match else None) or ""
+    unit = (match[1] if match else None) or (ending if is_unit(ending) else "")
     is_length = quantity_of(channel) == "displacement"
     stated = is_unit(unit) or (words.endswith("]") and not unit.isdecimal())
     if is_length and channel not in given and unit and stated and unit_in(title, channel) is None:

@@ -420,7 +420,8 @@ def test_one_gap_is_one_place(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "title", ["sensor (V)", "Position [mV]", "displacement (s)", "Position [counts]", "sensor [%]"]
+    "title",
+    ["sensor (V)", "Position [mV]", "displacement (s)", "displacement_V", "Position [counts]", "sensor [%]"],
 )
 def test_a_displacement_in_a_unit_that_is_no_length_is_not_read_as_metres(tmp_path, title):
     (tmp_path / "t.csv").write_text(text(",", f"time_s,voltage_V,{title}\n"))
