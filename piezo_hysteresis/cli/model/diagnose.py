@@ -20,6 +20,7 @@ import argparse
 
 from ...discrepancy import Diagnosis, diagnose
 from ...discrepancy.choice.live_diagnosis import LiveDiagnosis
+from ...discrepancy.choice.time_to_decide import ERROR_RATE, LONGEST
 from ...errors import IdentificationError, ParameterError
 from ...home_path import in_home
 from ...model import model_file
@@ -132,6 +133,8 @@ def _of_stage(args: argparse.Namespace) -> LiveDiagnosis:
 def _of_recording(args: argparse.Namespace) -> Diagnosis:
     if not args.experiment:
         raise ParameterError("diagnose: got no recording, expected one or several, or --stage FILE")
+    if (args.error_rate, args.stage_time, args.seed) != (ERROR_RATE, LONGEST, 0):
+        raise ParameterError("diagnose: got --error-rate, --stage-time or --seed without --stage, expected --stage FILE")
     if not args.time > 0.0:
         raise ParameterError(f"diagnose: got --time {args.time:g}, expected more than 0 s")
     require_new_results(args)

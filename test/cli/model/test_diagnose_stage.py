@@ -59,6 +59,7 @@ def test_a_stage_is_diagnosed_while_it_is_driven(piezo, tmp_path):
     [
         ((), "got no recording, expected one or several, or --stage FILE"),
         (("--stage", "plant.yaml"), "expected the folder of the experiment to write"),
+        (("recording", "--error-rate", "0.01"), "without --stage"),
         (("recording", "--stage", "plant.yaml", "-o", "out"), "expected --stage alone"),
         (("--stage", "plant.yaml", "-o", "out", "--error-rate", "0.7"), "error rate: got 0.7"),
         (("--stage", "plant.yaml", "-o", "out", "--stage-time", "3"), "stage time: got 3 s"),
