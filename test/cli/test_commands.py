@@ -72,6 +72,7 @@ def test_identify_writes_a_model_and_its_certainty(identified):
     assert answer["delay_s"] == pytest.approx(60e-6)
     assert [p["phase"] for p in answer["phases"] if not p["fitted"]] == ["validation"]
     assert answer["free_run_error_percent_of_range"] < 0.1
+    assert "This is the error over the phases that were not fitted." in answer["verdict_text"]
 
 
 def test_validate_reports_the_one_error_measure(piezo, identified, folder, tmp_path):

@@ -134,11 +134,12 @@ def verdict_line(found: Identification) -> str:
     )
     names = ", ".join(undetermined(fit))
     at_bounds = f" At a bound of the range, and therefore without an interval: {names}." if names else ""
+    over = "" if all(p.is_fitted for p in found.phases) else " This is the error over the phases that were not fitted."
     largest = ""
     if len(found.phases) > 1:
         worst = max(found.phases, key=lambda p: p.percent)
         largest = f" The error is largest in {worst.phase}: {worst.percent:.3g} % of range."
-    return f"Verdict: {error_sentence(percent)}{largest}{caveat}{at_bounds}"
+    return f"Verdict: {error_sentence(percent)}{over}{largest}{caveat}{at_bounds}"
 
 
 def answer(found: Identification, path: str) -> dict[str, Any]:
