@@ -58,7 +58,9 @@ class RunningRms:
         return float(np.sqrt(sum(s for _, s in self._squares) / self._held)) if self._held else None
 
     def add(self, values: Array) -> None:
-        """Add the next samples, shape (n,)."""
+        """Add the next samples, shape (n,); a stream without a model has none."""
+        if not values.size:
+            return
         self._squares.append((values.size, float(values @ values)))
         self._held += values.size
         while self._held - self._squares[0][0] >= self._count:
