@@ -77,7 +77,7 @@ class AxesPredictor:
 
     def __init__(self, model: AxesModel, rms_time: float = 1.0) -> None:
         self.model = model
-        self._rms = [RunningRms(max(1, round(rms_time / model.sample_period))) for _ in range(model.outputs)]
+        self._rms = [RunningRms.over(rms_time, model.sample_period) for _ in range(model.outputs)]
         self._state, self._last = model.rest(), np.zeros(model.inputs)
         self._count = 0
         self.warming_up = False

@@ -19,7 +19,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezo_hysteresis.errors import RecordError
+from piezo_hysteresis.errors import ParameterError, RecordError
 from piezo_hysteresis.model.axes_model import AxesModel
 from piezo_hysteresis.online.axes_predictor import AxesPredictor
 
@@ -48,6 +48,12 @@ def drives(size, seed=1):
 def from_rest(u):
     """The displacements of the stage after it has rested at 0 V."""
     return MODEL.run(u, MODEL.rest())[0]
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_time_that_is_none_is_refused_as_by_the_predictor_of_one_axis(wrong):
+    with pytest.raises(ParameterError, match="rms_time: got"):
+        AxesPredictor(MODEL, rms_time=wrong)
 
 
 @given(st.lists(st.integers(1, 80), min_size=1, max_size=8))
