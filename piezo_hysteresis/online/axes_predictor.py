@@ -136,7 +136,7 @@ class AxesPredictor:
         ------
         RecordError
             If the block has other numbers of drives or displacements than the model, or not as many of one as of the
-            other.
+            other, or if a displacement is not finite.
         ModelError
             If a voltage is not finite.
         """
@@ -147,6 +147,9 @@ class AxesPredictor:
                 f"samples: got {u.shape[-1]} drives and {measured.shape[-1]} displacements, expected "
                 f"{self.model.inputs} and {self.model.outputs} as the model has"
             )
+        if not np.isfinite(measured).all():
+            self._forget()
+            raise RecordError("displacements: got samples that are not finite, expected numbers; leave them out")
         if restarted:
             self._begin(u, settled)
         elif missing:

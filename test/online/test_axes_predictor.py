@@ -56,6 +56,16 @@ def test_a_time_that_is_none_is_refused_as_by_the_predictor_of_one_axis(wrong):
         AxesPredictor(MODEL, rms_time=wrong)
 
 
+def test_a_displacement_that_is_no_number_is_refused_and_leaves_the_offset():
+    """One displacement that was NaN made the offset NaN, and with it every later prediction."""
+    predictor, at_rest = AxesPredictor(MODEL), np.zeros((40, 2))
+    predictor.predict(at_rest, at_rest + 1e-9, restarted=True)
+    with pytest.raises(RecordError, match="displacements: got samples"):
+        predictor.predict(at_rest, np.full(at_rest.shape, np.nan))
+    answer = predictor.predict(at_rest, at_rest + 1e-9)
+    assert answer.warming_up and np.abs(answer.residual).max() < 1e-15
+
+
 @given(st.lists(st.integers(1, 80), min_size=1, max_size=8))
 def test_every_cutting_gives_the_bits_of_the_model(sizes):
     u = np.concatenate((np.zeros((20, 2)), drives(sum(sizes))))
