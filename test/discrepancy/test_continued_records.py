@@ -55,6 +55,7 @@ def test_a_lag_is_named_although_the_records_on_average_are_at_the_floor(tmp_pat
     experiment, truth = simulated(tmp_path, 12)
     found = diagnose(experiment)
     assert found.names == ("amplifier_bandwidth",)
+    assert not any("amplifier_bandwidth_held" in reason for reason in found.rejected.values())
     (pole,) = (n for n in found.fit.names if n.endswith(".tau"))
     low, high = found.fit.interval(pole)
     assert low < 1.0 / (2.0 * np.pi * truth["electronics.amplifier_bandwidth"]) < high

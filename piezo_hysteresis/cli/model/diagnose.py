@@ -134,7 +134,7 @@ def _of_recording(args: argparse.Namespace) -> Diagnosis:
     if not args.experiment:
         raise ParameterError("diagnose: got no recording, expected one or several, or --stage FILE")
     if (args.error_rate, args.stage_time, args.seed) != (ERROR_RATE, LONGEST, 0):
-        raise ParameterError("diagnose: got --error-rate, --stage-time or --seed without --stage, expected --stage FILE")
+        raise ParameterError("diagnose: got --error-rate, --stage-time or --seed without --stage")
     if not args.time > 0.0:
         raise ParameterError(f"diagnose: got --time {args.time:g}, expected more than 0 s")
     require_new_results(args)

@@ -129,7 +129,7 @@ def _turn(
     if best is None:
         return None
     reason = reason or _untried_twin(type(best.effect), effects)
-    gain = before.cost - best.score.cost
+    gain, said = before.cost - best.score.cost, best.effect.public_name()
     rivals = list[FittedCandidate]()
     rejected = {name: f"on slow drive it equals {t}, which is in the model" for name, t in twins.items()}
     if reason is not None:
@@ -140,13 +140,13 @@ def _turn(
             rivals.append(fitted)
         else:
             rejected[fitted.name] = (
-                f"in cross-validation its mean ln R² is {lead:.2f} ± {error:.2f} higher than with {best.name}"
+                f"in cross-validation its mean ln R² is {lead:.2f} ± {error:.2f} higher than with {said}"
             )
     others = [c for c in screened if all(c.name != r.name for r in refits)]
     for other in others:
         most = max(0.0, before.cost - other.score.cost)
         rejected[other.name] = (
-            f"it is predicted to lower mean ln R² by at most {most:.2f}, where {best.name} lowers it by {gain:.2f}"
+            f"it is predicted to lower mean ln R² by at most {most:.2f}, where {said} lowers it by {gain:.2f}"
         )
     return Step(before, best, reason is None, tuple(rivals), rejected, (*refits, *others))
 
