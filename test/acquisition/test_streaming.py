@@ -155,7 +155,7 @@ def test_the_stage_is_the_last_line_of_defence():
     acquisition, listener = started(stage)
     play(acquisition, [0.0, 11.0], "too_high")
     listener.wait(lambda heard: heard.failures)
-    assert "11 V" in str(listener.failures[0])
+    assert "11.0 V" in str(listener.failures[0])
     assert stage.made_safe == 1
     assert not listener.joined("voltage").any()
 
