@@ -50,7 +50,7 @@ from .joint_fits import (
 from .one_core import on_one_core
 from .published_steps import delay_of_steps, published_steps
 from .records.conditioning_split import known_from_within
-from .records.excitation_check import one_way
+from .records.excitation_check import STILL, one_way
 from .records.noise import without_voltage_noise
 from .records.one_axis import one_axis
 from .records.roles import HELD_OUT, Roles, roles_of
@@ -193,7 +193,7 @@ def _range_of_motion(records: Sequence[Record], roles: Roles) -> float:
             f"got {counted(max(moving), 'sample')} in the longest record that moves, expected {FEWEST_SAMPLES} or more"
         )
     reach = max(float(np.ptp(r.displacement)) for r in records)
-    if reach == 0.0:
+    if reach < STILL:
         raise IdentificationError("the displacement never changes; expected that of a stage that is driven")
     return reach
 

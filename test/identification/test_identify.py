@@ -192,7 +192,10 @@ def test_a_stage_that_was_never_driven_back_is_not_said_to_be_known():
     assert found.severe
 
 
-@pytest.mark.parametrize(("size", "gain", "message"), [(1000, 0.0, "never changes"), (5, 1e-6, "got 5 samples in")])
+@pytest.mark.parametrize(
+    ("size", "gain", "message"),
+    [(1000, 0.0, "never changes"), (1000, 1e-206, "never changes"), (5, 1e-6, "got 5 samples in")],
+)
 def test_a_dead_sensor_or_a_few_samples_are_named(size, gain, message):
     voltage = np.linspace(0.0, 9.0, size)
     with pytest.raises(IdentificationError, match=message):

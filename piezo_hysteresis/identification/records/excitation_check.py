@@ -33,6 +33,8 @@ from .steady_waves import SWING, find_turns
 
 SHORTEST_RECORD = 16
 """Fewest samples of a record that is used."""
+STILL = 1e-15
+"""Range of the displacement below which a stage does not move [m]; squares of far smaller ones are no numbers."""
 HOLD = 1.0
 """Time for which a level must be held after a change, so that creep becomes visible [s]."""
 MOVED = 0.02
@@ -129,7 +131,7 @@ def check_motion(name: str, moving: Collection[Record]) -> None:
             f"{name}: the drive does not move in any record that is used; expected loops, steps or noise of "
             f"{SHORTEST_RECORD} samples or more, in phases other than idle and hold"
         )
-    if not any(np.ptp(r.displacement) > 0.0 for r in moving):
+    if not any(np.ptp(r.displacement) >= STILL for r in moving):
         raise IdentificationError(
             f"{name}: the displacement never changes; expected that of a stage that is driven; check the column"
         )
