@@ -173,13 +173,12 @@ def simplest(refits: list[FittedCandidate]) -> FittedCandidate:
 
 
 def best_of_each(refits: list[FittedCandidate]) -> list[FittedCandidate]:
-    """The best refit of every effect, best first, without those that only imitate another effect."""
-    worst_first = sorted((c for c in refits if not is_imitation(c)), key=BY_COST, reverse=True)
+    """The best refit of every effect, best first; a limit that bends all along the drive is a curve and not a limit."""
+    worst_first = sorted((c for c in refits if not bends_all_along(c)), key=BY_COST, reverse=True)
     return sorted({c.name: c for c in worst_first}.values(), key=BY_COST)
 
 
-def is_imitation(candidate: FittedCandidate) -> bool:
-    """Whether a limit bends over more than the drive range, as a curve does, or creep goes back, as no material does."""
-    if candidate.name == AmplifierSaturation.name:
-        return candidate.effect["corner"] > candidate.training_data.extent.span
-    return candidate.effect.family == Creep.family and candidate.effect.values.get("gamma", 0.0) < 0.0
+def bends_all_along(candidate: FittedCandidate) -> bool:
+    """Whether a limit bends over more than the whole drive range, so that it is a curve and not a limit."""
+    saturates = candidate.name == AmplifierSaturation.name
+    return saturates and candidate.effect["corner"] > candidate.training_data.extent.span

@@ -24,7 +24,7 @@ from piezo_hysteresis.discrepancy.search.acceptance_tests import (
     first_rejection,
     is_steady,
 )
-from piezo_hysteresis.discrepancy.search.candidate_refits import best_of_each, simplest
+from piezo_hysteresis.discrepancy.search.candidate_refits import bends_all_along, simplest
 from piezo_hysteresis.discrepancy.search.candidates import FittedCandidate
 from piezo_hysteresis.effects import (
     AmplifierSaturation,
@@ -168,21 +168,19 @@ def test_what_only_keeps_the_noise_of_a_measured_voltage_from_the_model_is_no_ef
     assert (rejection is not None and "noise" in rejection) if small and noise else rejection is None
 
 
-@pytest.mark.parametrize(
-    ("effect", "is_left_out"),
-    [
-        (AmplifierSaturation(upper=9.0, corner=0.1), False),
-        (AmplifierSaturation(upper=9.0, corner=4.0), False),
-        (AmplifierSaturation(upper=9.0, corner=30.0), True),
-        (Creep(gamma=0.002), False),
-        (Creep(gamma=-0.002), True),
-        (CreepFractional(gamma=0.002, exponent=0.5), False),
-        (CreepFractional(gamma=-0.002, exponent=0.5), True),
-    ],
-)
-def test_a_limit_wider_than_the_drive_and_creep_that_goes_back_only_imitate_effects(effect, is_left_out):
+@pytest.mark.parametrize("gamma", [0.002, -0.002])
+@pytest.mark.parametrize("law", [Creep(), CreepFractional(exponent=0.5)], ids=["logarithmic", "fractional"])
+def test_creep_that_goes_back_is_not_named(monkeypatch, law, gamma):
     """Large plays beside the loop were named creep, with γ = -0.001 and the largest exponent."""
-    assert (best_of_each([fitted(effect, (), np.empty((0, 0)))]) == []) is is_left_out
+    monkeypatch.setattr(acceptance_tests, "without", lambda candidate: None)
+    found = replace(fitted(law.with_values(gamma=gamma), (), np.empty((0, 0))), score=scored(1.0, 1.0))
+    assert ("negative" in str(first_rejection(found, scored(9.0, 9.0)))) is (gamma < 0.0)
+
+
+@pytest.mark.parametrize(("corner", "curve"), [(0.1, False), (4.0, False), (30.0, True)])
+def test_a_limit_whose_bend_is_wider_than_the_drive_is_a_curve(corner, curve):
+    saturation = AmplifierSaturation(upper=9.0, corner=corner)
+    assert bends_all_along(fitted(saturation, (), np.empty((0, 0)))) is curve
 
 
 @pytest.mark.parametrize(
