@@ -48,7 +48,7 @@ class Diagnosis(Pictured):
     reason : str
         What was found and why, in one or a few sentences.
     model : Model
-        The model with the named effects; without any, the best of the refitted baseline, a given model, another structure.
+        The model with the named effects; without any, the best of refitted baseline, given model and other structure.
     baseline : Model
         The given model; without one, the refitted model without the effects.
     experiment : Experiment

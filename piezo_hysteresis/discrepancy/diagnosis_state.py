@@ -51,8 +51,7 @@ class DiagnosisState:
 
     @property
     def usable(self) -> list[int]:
-        """Indices of the records to compare with a model: of the phases that do not only prepare the stage, those that
-        begin in a known state and have at least `PIECES` samples, or all if there are none."""
+        """Indices of the records to compare: no idle phases, and short or truncated ones if there are no others."""
         informative = [i for i, r in enumerate(self.experiment) if r.phase not in IDLE]
         whole = [i for i in informative if not self.experiment[i].truncated]
         return [i for i in whole if self.experiment[i].size >= PIECES] or whole or informative

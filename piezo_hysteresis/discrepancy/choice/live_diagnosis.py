@@ -171,8 +171,7 @@ class LiveDiagnosis:
                 {"time_s": round(u.time, 6), "played": u.played, "probabilities": u.probabilities} for u in self.updates
             ],
             "untested": list(self.untested),
-            "undecidable": closest
-            and {"rivals": list(closest.rivals), "drive": closest.drive, **closest.numbers()},
+            "undecidable": closest and {"rivals": list(closest.rivals), "drive": closest.drive, **closest.numbers()},
         }
 
     @property

@@ -46,7 +46,7 @@ def first_rejection(best: FittedCandidate, before: Score) -> str | None:
         return f"in cross-validation it lowers mean ln R² by {_below(gain)}, and a decrease by {LEAST_GAIN:g} is needed"
     if best.name == MainsHum.name and not is_steady(best, before):
         return "its amplitude depends on the drive, which mains hum does not"
-    if best.effect.family == Creep.family and best.effect.values.get("gamma", 0.0) < 0.0:
+    if best.effect.family == Creep.family and "gamma" in best.effect.values and best.effect["gamma"] < 0.0:
         return "its γ is negative, and no material creeps back"
     if not exceeds_voltage_noise(best):
         return "it changes the voltage no more than the noise with which it was measured"

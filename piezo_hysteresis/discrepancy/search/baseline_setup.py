@@ -181,8 +181,8 @@ def better_fit(
 ) -> tuple[Fit, Score]:
     """A fit and its score, or those from another start if the fit is better.
 
-    Cross-validation judges the start first, after one linear step, by C, or by V if only a `share` of V may remain after
-    the fit. A start that is not better then, or from which the fit fails, is left out.
+    Cross-validation judges the start first, after one linear step, by C, or by V if only a `share` of V may remain
+    after the fit. A start that is not better then, or from which the fit fails, is left out.
     """
     with suppress(*FAILURES):
         first = scored(start, training_data)
