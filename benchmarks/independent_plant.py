@@ -159,7 +159,8 @@ class Plant:
         if "hysteresis_memory" in e:
             radii = np.linspace(0.02, 0.3, 9)
             weights = e["hysteresis_memory"] * np.exp(-radii / 0.1) * (1 + 0.5 * np.cos(9 * radii))
-            w = w + kernels.plays(v, v0, radii, weights)
+            w = w + kernels.plays(v, v0, radii, weights) + v0 * weights.sum()
+            w0 += v0 * weights.sum()
         return w, w0
 
     def _creep(self, w: Array, w0: float, dt: float) -> tuple[Array, float]:

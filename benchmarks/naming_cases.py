@@ -34,7 +34,7 @@ NOISES = (1e-4, 5e-4, 2e-3)
 """Of the stroke, rms per sample at the fastest period."""
 EFFECTS = tuple(dict.fromkeys(e.public_name() for e in CATALOGUE))
 """Public names of the catalogue."""
-GROUPS = ("effect_free", "effects", "pairs", "uncatalogued", "absent", "plays", "poor")
+GROUPS = ("effect_free", "effects", "pairs", "uncatalogued", "absent", "plays", "plays_beside_loop", "poor")
 
 
 @dataclass(frozen=True)
@@ -147,6 +147,7 @@ def cases(groups: tuple[str, ...], seeds: int, noises: tuple[float, ...] = NOISE
         "uncatalogued": _uncatalogued,
         "absent": _absent,
         "plays": _plays,
+        "plays_beside_loop": _plays_beside_loop,
         "poor": _poor,
         "quick": _quick,
         "explicit": _explicit,
@@ -234,6 +235,15 @@ def _plays(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:
     for seed in range(seeds):
         for k, partner in enumerate(partners):
             yield Case("plays", ("hysteresis_memory", *partner), seed, noises[(k + seed) % len(noises)])
+
+
+def _plays_beside_loop(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:
+    """Plays beside a Bouc-Wen loop, from hardly visible ones to ones that are larger than the loop."""
+    for seed in range(seeds):
+        for size in (0.05, 0.5, 5.0):
+            for noise in noises:
+                extra = {"hysteresis_memory": size}
+                yield Case("plays_beside_loop", ("hysteresis_memory",), seed, noise, extra=extra)
 
 
 def _poor(seeds: int, noises: tuple[float, ...]) -> Iterator[Case]:

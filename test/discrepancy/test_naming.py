@@ -100,6 +100,23 @@ def test_a_hidden_effect_is_named_and_its_gap_closes_on_unseen_records(case):
     assert found.gap.after <= 1.3 * found.gap.floor
 
 
+@pytest.mark.parametrize("size", [0.05, 5.0])
+def test_plays_beside_a_loop_are_named_and_described_whether_small_or_larger_than_the_loop(size):
+    """They are at rest wherever a record begins; nine of linear half widths, where the catalogue has eight."""
+    found = answered(hidden("hysteresis_memory", extra={"hysteresis_memory": size}))
+    assert found.names == ("hysteresis_memory",)
+    assert found.gap.after <= 1.3 * found.gap.floor
+
+
+def test_a_sensor_that_is_set_to_zero_before_every_record_is_no_missing_effect():
+    experiment = recorded(Case("effect_free", (), 1, 1e-5, layout=BRIEF))
+    zeroed = (replace(r, displacement=r.displacement - r.displacement[0]) for r in experiment)
+    found = diagnose(replace(experiment, records=tuple(zeroed)), effects=[BY_NAME["hysteresis_memory"]])
+    assert found.verdict is Verdict.NOTHING_MISSING
+    assert found.model.values()["offset.settling"] == pytest.approx(-1.0, abs=0.01)
+    assert found.gap.after <= 1.2 * found.gap.floor
+
+
 def test_data_of_an_explicit_step_have_an_answer_on_request_only():
     integrated = recorded(Case("effect_free", (), 3, 5e-4, "explicit", layout=BRIEF))
     library = [BY_NAME[n] for n in ("creep", "mains_hum")]

@@ -40,7 +40,7 @@ class Offset(Effect):
     -----
     The state of creep and hysteresis at the start of a record depends on the motion during the minutes or days before,
     which is not recorded. The fitted ratio r absorbs its influence, which could otherwise be mistaken for another
-    effect. r is the same for all records.
+    effect. r is the same for all records. A sensor that is set to zero before every record has r = −1.
 
     Examples
     --------
@@ -60,7 +60,7 @@ class Offset(Effect):
     parameters = (
         Parameter("y0", "y0", "m", 0.0, -1.0, 1.0, "reading at zero displacement", "definition", 0.0, 1e-6),
         Parameter(
-            "settling", "r", "1", 0.0, -0.5, 0.5, "additional settling at rest, relative", "definition", 0.0, 0.01
+            "settling", "r", "1", 0.0, -1.5, 1.5, "additional settling at rest, relative", "definition", 0.0, 0.01
         ),
     )
 
