@@ -69,17 +69,18 @@ def is_certain(candidate: FittedCandidate) -> bool:
 
     A Wald test of all its numbers that are known when the effect is off, with the others, such as a time constant, as
     they were found: without the effect they do not exist, and a size may be known only together with them. They count
-    as degrees of freedom. Hum, which is free in every record, has none.
+    as degrees of freedom. Hum, which is free in every record, has none. A limit that is never reached has no influence.
     """
     data, model = candidate.training_data, candidate.fit.model
     noise = data.floors if data.noise is None else data.noise
     free, span = data.free_with(model), stroke(data.records)
     fit = with_form_uncertainty(candidate.fit, data.records, free, data.floors, noise, span)
     now, off = fit.values, model.with_effect(candidate.effect.off()).values()
-    own = [n for n in fit.names if n.partition(".")[0] == candidate.name and fit.standard_errors[n] > 0.0]
+    fitted = [n for n in fit.names if n.partition(".")[0] == candidate.name]
+    own = [n for n in fitted if fit.standard_errors[n] > 0.0]
     sizes = [n for n in own if model.row(n).off is not None]
     if not sizes:
-        return True
+        return not fitted
     precision = np.linalg.pinv([[fit.correlation(n, m) for m in own] for n in own], hermitian=True)
     away = np.array([(now[n] - off[n]) / fit.standard_errors[n] if n in sizes else 0.0 for n in own])
     return bool(away @ precision @ away > chdtri(len(own), UNCERTAIN))

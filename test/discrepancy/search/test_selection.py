@@ -33,6 +33,7 @@ from piezo_hysteresis.discrepancy.search.selection_result import FAR, Selection,
 from piezo_hysteresis.effects import (
     CATALOGUE,
     HYSTERESIS,
+    AmplifierSlewLimit,
     Arx,
     Backlash,
     Creep,
@@ -163,6 +164,12 @@ def test_two_effects_that_a_later_one_makes_superfluous_are_taken_back():
     (kept,) = certain(steps_with((DRIFT, EvenInputPolynomial(), CREEP), (CREEP,)))
     assert kept.best.name == CREEP.name and kept.best.score.excess < ADEQUATE
     assert set(kept.rejected) == {DRIFT.name, EvenInputPolynomial.name}
+
+
+def test_a_limit_that_is_not_reached_beside_a_later_effect_is_taken_back():
+    """Beside an amplifier pole of 57 µs, a slew limit was named that the drive never reached."""
+    (kept,) = certain(steps_with((AmplifierSlewLimit(S=1e6), CREEP), (CREEP,)))
+    assert kept.best.name == CREEP.name and list(kept.rejected) == [AmplifierSlewLimit.name]
 
 
 @pytest.mark.parametrize("first", [True, False])
