@@ -29,6 +29,8 @@ from .units import is_unit, plain, units_of
 
 _UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$|[\s_,/:]\s*([^\s_,/:\[\]()]+)\s*$")
 """Unit at the end of a title, in brackets or after a separator."""
+_AS_WRITTEN = re.compile(r"displacement_([^\W\d_]{2,})", re.IGNORECASE)
+"""Title as this package writes it, where the word after the channel is a unit; a single letter may name an axis."""
 _WORDS = {
     "time": r"time|zeit|\bt\b|\bx value\b|\bx-axis\b",
     "voltage": r"volt|drive|spannung|input|\bu\b|\bv\b|\bu_?in\b|\bv_?in\b",
@@ -57,7 +59,8 @@ def unit_in(title: str, channel: str) -> str | None:
 def unit_of(title: str, channel: str, given: Collection[str]) -> str | None:
     """The unit of `unit_in`; a displacement whose title has another unit needs one that is `given`.
 
-    Text in square brackets is a unit, a number is not. A drive may be the command of a controller in any unit.
+    Text in square brackets is a unit, a number is not, and in ``displacement_furlong`` the word after the channel is.
+    A drive may be the command of a controller in any unit.
 
     Raises
     ------
@@ -69,7 +72,9 @@ def unit_of(title: str, channel: str, given: Collection[str]) -> str | None:
     ending = (match[2] if match else None) or ""
     unit = (match[1] if match else None) or (ending if is_unit(ending) else "")
     is_length = quantity_of(channel) == "displacement"
-    stated = is_unit(unit) or (words.endswith("]") and not unit.isdecimal())
+    if written := _AS_WRITTEN.fullmatch(words):
+        unit = written[1]
+    stated = written or is_unit(unit) or (words.endswith("]") and not unit.isdecimal())
     if is_length and channel not in given and unit and stated and unit_in(title, channel) is None:
         raise RecordingError(
             f"{channel}: got the unit '{unit}' in the title '{title.strip()}', expected one of "

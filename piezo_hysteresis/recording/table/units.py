@@ -22,7 +22,7 @@ from collections.abc import Mapping
 from ...channel_mapping import quantity_of
 from ...errors import RecordingError
 
-_METRE: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "pm": 1e-12}
+_METRE: Mapping[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "pm": 1e-12}
 """Units of length over the metre."""
 _VOLT: Mapping[str, float] = {"V": 1.0, "kV": 1e3, "mV": 1e-3, "uV": 1e-6}
 """Units of voltage over the volt."""

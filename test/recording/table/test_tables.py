@@ -421,7 +421,15 @@ def test_one_gap_is_one_place(tmp_path):
 
 @pytest.mark.parametrize(
     "title",
-    ["sensor (V)", "Position [mV]", "displacement (s)", "displacement_V", "Position [counts]", "sensor [%]"],
+    [
+        "sensor (V)",
+        "Position [mV]",
+        "displacement (s)",
+        "displacement_V",
+        "displacement_furlong",
+        "Position [counts]",
+        "sensor [%]",
+    ],
 )
 def test_a_displacement_in_a_unit_that_is_no_length_is_not_read_as_metres(tmp_path, title):
     (tmp_path / "t.csv").write_text(text(",", f"time_s,voltage_V,{title}\n"))
@@ -434,7 +442,15 @@ def test_a_displacement_in_a_unit_that_is_no_length_is_not_read_as_metres(tmp_pa
     np.testing.assert_allclose(record.displacement, 2e-6 * metres.displacement)
 
 
-@pytest.mark.parametrize("title", ["Position [0]", "Position (front)", "sensor"])
+@pytest.mark.parametrize("title", ["displacement_cm", "Displacement (cm)", "Position [cm]"])
+def test_centimetres_are_a_length(tmp_path, title):
+    (tmp_path / "t.csv").write_text(text(",", f"time_s,voltage_V,{title}\n"))
+    (metres,) = read(tmp_path / "t.csv", phases="x", units={"displacement": "m"})
+    (record,) = read(tmp_path / "t.csv", phases="x")
+    np.testing.assert_allclose(record.displacement, 1e-2 * metres.displacement)
+
+
+@pytest.mark.parametrize("title", ["Position [0]", "Position (front)", "displacement_x", "sensor"])
 def test_a_number_or_a_remark_in_a_title_is_no_unit(tmp_path, title):
     (tmp_path / "t.csv").write_text(text(",", f"time_s,voltage_V,{title}\n"))
     (metres,) = read(tmp_path / "t.csv", phases="x", units={"displacement": "m"})
