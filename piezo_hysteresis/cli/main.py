@@ -84,12 +84,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except IdentificationError as error:
-        return _print_error(error, NOT_IDENTIFIABLE)
+        return _print_error(_by_option(str(error), arguments), NOT_IDENTIFIABLE)
     except (PiezoError, OSError) as error:
         _drop_unwritable()
         if isinstance(error, BrokenPipeError):
             return BROKEN_PIPE
-        return _print_error(error, BAD_INPUT)
+        return _print_error(_by_option(str(error), arguments), BAD_INPUT)
     except MemoryError:
         return _print_error("the recording does not fit into memory; decimate it or give fewer rows", BAD_INPUT)
     except KeyboardInterrupt as interrupt:
@@ -106,6 +106,17 @@ def _arguments(chosen: str | None, arguments: Sequence[str]) -> argparse.Namespa
         sys.stdout.write(said.getvalue())
         sys.stdout.flush()
         raise
+
+
+def _by_option(message: str, arguments: Sequence[str]) -> str:
+    """A message that begins with the argument of a function, with the option that was given for it instead.
+
+    >>> _by_option("way_back: got -1 s, expected zero or a finite time", ["compensate", "--way-back", "-1"])
+    '--way-back: got -1 s, expected zero or a finite time'
+    """
+    name, colon, rest = message.partition(":")
+    option = f"--{name.replace('_', '-')}"
+    return f"{option}{colon}{rest}" if option in (a.partition("=")[0] for a in arguments) else message
 
 
 def _drop_unwritable() -> None:

@@ -197,7 +197,7 @@ NOBODY = "there is no home folder of that user, expected another path"
         ("diagnose --stage {node} -o {place}/s", "'ros__parameters' under the heading '/**:'"),
         ("diagnose --stage {node} -o {place}/s --correction {place}/c.npz", "a name that ends in .yaml"),
         ("simulate -o {place}/s --plant {broken}", "broken YAML"),
-        ("simulate -o {place}/s --noise -1", "sensor.noise"),
+        ("simulate -o {place}/s --noise -1", "--noise"),
         ("simulate -o {place}/s --sample-period 1", "sample period"),
         ("record {place}/none.yaml short -o {place}/r", "none.yaml: No such file or directory, expected a YAML file"),
         ("history {place}/none.csv", "none.csv: cannot be read (No such file or directory), expected"),

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from ...compensation import Limits, Plan, plan
-from ...errors import ModelError, RecordingError
+from ...errors import ModelError, ParameterError, RecordingError
 from ...home_path import in_home
 from ...model import model_file
 from ...recording.wanted_path import read_path
@@ -40,6 +40,8 @@ from ..terminal import console, show
 
 UNREACHABLE = "A part of the path cannot be reached."
 """Beginning of the last line after a path that cannot be followed."""
+LONGEST_WAY = 1000.0
+"""Longest way to the path or back [s], as that of the compensation node."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -97,6 +99,7 @@ def run(args: argparse.Namespace) -> int:
         On a model or a path that cannot be read, or a chain that cannot be inverted.
     """
     require_new_results(args)
+    _check_times(args)
     model = model_file.load(args.model)
     wanted, period = read_path(args.path)
     resampled = period is not None and abs(period - model.sample_period) > 1e-6 * model.sample_period
@@ -145,6 +148,14 @@ def run(args: argparse.Namespace) -> int:
         out.print(UNREACHABLE)
         return 1
     return 0
+
+
+def _check_times(args: argparse.Namespace) -> None:
+    for option, value in (("--approach", args.approach), ("--way-back", args.way_back)):
+        if not 0.0 <= value <= LONGEST_WAY:
+            raise ParameterError(f"{option}: got {value:g} s, expected 0 to {LONGEST_WAY:g} s")
+    if not math.isfinite(args.rest_voltage):
+        raise ParameterError(f"--rest-voltage: got {args.rest_voltage:g} V, expected a finite voltage")
 
 
 def _save(found: Plan, place: Path) -> None:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from typing import Any
 
 from ...effects import HYSTERESIS, OPERATORS, PublishedBoucWen
@@ -27,6 +28,7 @@ from ...identification.records.roles import HELD_OUT
 from ...identification.structure.mode import assumed_numbers
 from ...model import model_file
 from ...model.axes_samples import has_several_axes
+from ...notice import Notice
 from ...report.json_file import write_json
 from ...report.tables.parameter_table import correlation_table, parameter_table
 from ...report.tables.table import Table
@@ -91,6 +93,9 @@ def run(args: argparse.Namespace) -> int:
     if args.taps is not None:
         raise ParameterError(f"--taps: got {args.taps} for a stage of one axis, expected several axes or no --taps")
     model_file.require_name(args.output)
+    if args.orders is not None and not (args.orders[0] >= 0 and args.orders[1] >= 1):
+        got = " ".join(map(str, args.orders))
+        raise ParameterError(f"--orders: got {got}, expected NA of at least 0 and NB of at least 1")
     orders = None if args.choose_orders else tuple(args.orders or (8, 8))
     with progress("identify", usual_time(experiment.size, "2 s", 1)) as report_progress:
         found = identify(
@@ -101,6 +106,8 @@ def run(args: argparse.Namespace) -> int:
             held_out=HELD_OUT if args.held_out is None else tuple(args.held_out),
             progress=report_progress,
         )
+    if found.dynamics is None and (args.choose_orders or args.orders is not None):
+        found = replace(found, notices=(*found.notices, _without_orders(args)))
     path = model_file.save(found.model, args.output)
     verdict, severe = verdict_line(found), any(notice.severe for notice in found.notices)
     trusted = found.fit.converged and describes(found.free_run_percent) and not severe
@@ -117,6 +124,12 @@ def run(args: argparse.Namespace) -> int:
     out.print(f"wrote {path}")
     out.print(verdict, style="bold")
     return 0 if trusted else 1
+
+
+def _without_orders(args: argparse.Namespace) -> Notice:
+    option = "--choose-orders" if args.choose_orders else "--orders"
+    message = "no fitted record is broadband, so the orders of the dynamics follow from the structure that was chosen"
+    return Notice("orders", f"{option} has no effect: {message}; record noise or a multisine")
 
 
 def verdict_line(found: Identification) -> str:

@@ -49,7 +49,10 @@ def plant(args: argparse.Namespace) -> tuple[PlantParameters, dict[str, Any]]:
     """
     parameters = _read(args.plant)
     if args.noise is not None:
-        parameters = parameters.with_values({"sensor.noise": args.noise})
+        try:
+            parameters = parameters.with_values({"sensor.noise": args.noise})
+        except ParameterError as error:
+            raise ParameterError(str(error).replace("sensor.noise", "--noise", 1)) from None
     if args.hidden is None:
         return parameters, {"name": None, "changes": {}}
     hidden = hidden_effect(args.hidden, parameters)

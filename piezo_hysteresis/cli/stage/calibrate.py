@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     ParameterError
-        If the sample period is not positive.
+        If the sample period or the amplitude is not positive.
     StageError
         If the card is not there or has a driver, or output and input are not wired together.
     RecordingError
@@ -92,6 +92,9 @@ def run(args: argparse.Namespace) -> int:
         sensor_gain=1.0,
         max_slew_rate=20.0 / args.sample_period,  # nothing is connected that a step could harm
     )
+    span = setup.voltage_max - setup.voltage_min
+    if not 0.0 < args.amplitude <= span:
+        raise ParameterError(f"--amplitude: got {args.amplitude:g} V, expected more than 0 and at most {span:g} V")
     try:
         delay = _measured(setup, args.amplitude)
     except KeyboardInterrupt:

@@ -101,10 +101,10 @@ class ReadOptions:
     average: int | None = None
 
     def __post_init__(self) -> None:
-        for name in (*self.columns, *self.units):
+        for option, name in (*(("columns", c) for c in self.columns), *(("units", c) for c in self.units)):
             if not (is_channel(name) or name in LABELS):
                 raise RecordingError(
-                    f"`columns`: got channel '{name}', expected one of {', '.join((*CHANNELS, *LABELS))}, "
+                    f"`{option}`: got channel '{name}', expected one of {', '.join((*CHANNELS, *LABELS))}, "
                     "or another name with voltage, displacement or temperature in it, e.g. displacement_2"
                 )
         for name, unit in self.units.items():
