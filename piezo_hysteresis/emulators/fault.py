@@ -16,10 +16,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from ..errors import StageError
+
+TIMES = ("slow", "trickle")
+"""Kinds whose value is a time [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +62,7 @@ class FaultCatalogue:
     lasting : mapping of str to str
         Faults that last, from the start or from a command on: kind -> what happens.
     values : mapping of str to float
-        Default value by kind.
+        Default value by kind; the other kinds take none.
     """
 
     once: Mapping[str, tuple[str, str]]
@@ -76,7 +80,7 @@ class FaultCatalogue:
         Raises
         ------
         StageError
-            If the text does not have this form, or the kind is unknown.
+            If the text does not have this form, the kind is unknown, or the value is none of this kind.
 
         Examples
         --------
@@ -92,6 +96,14 @@ class FaultCatalogue:
             at, number = int(occurrence or 1), float(value) if value else self.values.get(kind, 0.0)
         except ValueError:
             raise StageError(f"fault: got '{text}', expected kind@COMMAND:occurrence=value") from None
+        if at < 1:
+            raise StageError(f"fault: got '{text}', expected occurrences counted from 1")
+        if value and kind not in self.values:
+            raise StageError(f"fault: got '{text}', expected no value; {', '.join(self.values)} take one")
+        if kind in TIMES and not 0.0 <= number < math.inf:
+            raise StageError(f"fault: got '{text}', expected a time in s that is not negative, e.g. {kind}=0.5")
+        if kind == "error" and not number.is_integer():
+            raise StageError(f"fault: got '{text}', expected the number of an error, e.g. {kind}={self.values[kind]:g}")
         return Fault(kind, command.upper(), at, number, kind in self.lasting)
 
 

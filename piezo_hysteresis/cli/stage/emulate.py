@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import signal
 import threading
@@ -27,12 +28,16 @@ from ...emulators.daqmx.server import DaqmxServer
 from ...emulators.gcs2.controller import Controller
 from ...emulators.gcs2.faults import FAULTS as GCS2_FAULTS
 from ...emulators.gcs2.server import Gcs2Server
+from ...errors import ParameterError
 from ...stage.simulated import SimulatedStage
+from ...stage.simulated.simulation import LONGEST_PERIOD, SHORTEST_PERIOD
 from ..options.plant_option import add_plant_arguments, plant
 from ..terminal import console
 
 _PORT = {"gcs2": 50000, "nidaqmx": 31763}
 """Default TCP port of every emulated device."""
+_SERVO_TIME, _NI_PERIOD = 50e-6, 20e-6
+"""Time between two samples of the stage behind each device [s]."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -57,14 +62,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--port", type=int, help=f"TCP port, 0 for any free one (default: {defaults})")
     add_plant_arguments(parser)
     parser.add_argument(
-        "--servo-time", metavar="S", type=float, default=50e-6, help="gcs2: servo time [s] (default: 5e-05)"
+        "--servo-time", metavar="S", type=float, help=f"gcs2: servo time [s] (default: {_SERVO_TIME:g})"
     )
     parser.add_argument(
         "--command-per-volt",
         metavar="C",
         type=float,
-        default=1.0,
-        help="gcs2: open-loop command over piezo voltage (default: 1)",
+        help="gcs2: open-loop command over piezo voltage, not 0 (default: 1)",
     )
     parser.add_argument(
         "--fault", action="append", default=[], metavar="FAULT", help="fault to inject, see below (repeatable)"
@@ -82,13 +86,14 @@ def run(args: argparse.Namespace) -> int:
     """
     parameters, _ = plant(args)
     port = _PORT[args.device] if args.port is None else args.port
-    period = args.servo_time if args.device == "gcs2" else 20e-6
+    gain = _checked_options(args)
+    period = (args.servo_time or _SERVO_TIME) if args.device == "gcs2" else _NI_PERIOD
     stage = SimulatedStage(parameters, seed=args.seed, sample_period=period)
     server: Gcs2Server | DaqmxServer
     if args.device == "gcs2":
         faults = [GCS2_FAULTS.parse(text) for text in args.fault]
         serial = f"{args.seed}-{os.getpid()}"  # drivers take two controllers with one serial number for one device
-        controller = Controller(stage, serial=serial, command_per_volt=args.command_per_volt, faults=faults)
+        controller = Controller(stage, serial=serial, command_per_volt=gain, faults=faults)
         server = Gcs2Server(controller, args.host, port)
     else:
         server = DaqmxServer(Card(stage, faults=[NI_FAULTS.parse(text) for text in args.fault]), args.host, port)
@@ -104,3 +109,19 @@ def run(args: argparse.Namespace) -> int:
         ended.wait()
         console().print("ended")
     return 0
+
+
+def _checked_options(args: argparse.Namespace) -> float:
+    """Open-loop command over piezo voltage, after the options that belong to one device were checked."""
+    if args.device != "gcs2":
+        for option, value in (("--servo-time", args.servo_time), ("--command-per-volt", args.command_per_volt)):
+            if value is not None:
+                raise ParameterError(f"{option}: got {value:g} for {args.device}, expected it for gcs2 only")
+    if args.servo_time is not None and not SHORTEST_PERIOD <= args.servo_time <= LONGEST_PERIOD:
+        raise ParameterError(
+            f"--servo-time: got {args.servo_time:g} s, expected {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
+        )
+    gain = 1.0 if args.command_per_volt is None else float(args.command_per_volt)
+    if not math.isfinite(gain) or gain == 0.0:
+        raise ParameterError(f"--command-per-volt: got {gain:g}, expected a finite number other than zero")
+    return gain

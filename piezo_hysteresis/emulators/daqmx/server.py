@@ -58,6 +58,8 @@ class DaqmxServer:
             raise StageError(
                 "NI emulator: the package nidaqmx is not installed, expected it; pip install 'nidaqmx[grpc]'"
             ) from None
+        if not 0 <= port <= 65535:  # gRPC would take the remainder
+            raise StageError(f"NI emulator: got port {port}, expected 0 to 65535")
         self._calls, self._messages, self._grpc = Calls(card), nidaqmx_pb2, grpc
         self._gone = False
         self._last: Samples = np.empty((0, 0))

@@ -28,9 +28,9 @@ from ..description import Description, Samples
 from ..limiter import Limiter
 from ..plant import Plant, PlantParameters, Reading
 
-_SHORTEST_PERIOD = 1e-6
+SHORTEST_PERIOD = 1e-6
 """Shortest sample period of a simulated stage [s]."""
-_LONGEST_PERIOD = 10e-3
+LONGEST_PERIOD = 10e-3
 """Longest sample period of a simulated stage [s]."""
 
 
@@ -52,8 +52,8 @@ class Simulation:
         self._description = Description(
             name=f"simulated {'streaming' if streaming else 'memory'} stage, seed {seed}",
             streaming=streaming,
-            sample_period_min=_SHORTEST_PERIOD,
-            sample_period_max=_LONGEST_PERIOD,
+            sample_period_min=SHORTEST_PERIOD,
+            sample_period_max=LONGEST_PERIOD,
             voltage_min=e.voltage_min,
             voltage_max=e.voltage_max,
             safe_voltage=rest,

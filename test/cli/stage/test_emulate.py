@@ -72,13 +72,25 @@ def test_two_controllers_at_a_time_are_two_devices():
     "words",
     [
         ("gcs2", "--fault", "earthquake"),
+        ("gcs2", "--fault", "slow=-1"),
+        ("gcs2", "--fault", "trickle=nan"),
+        ("gcs2", "--fault", "error=1.5"),
+        ("gcs2", "--fault", "link_lost=7"),
+        ("gcs2", "--fault", "slow@POS?:0"),
+        ("gcs2", "--command-per-volt", "0"),
+        ("nidaqmx", "--servo-time", "0.001"),
+        ("nidaqmx", "--port", "70000"),
         ("nidaqmx", "--fault", "servo_on"),
         ("gcs2", "--port", "99999"),
         ("gcs2", "--servo-time", "0"),
+        ("gcs2", "--noise", "-1"),
     ],
 )
 def test_an_invalid_emulator_option_gives_one_line(piezo, words):
+    if words == ("nidaqmx", "--port", "70000"):
+        pytest.importorskip("nidaqmx", reason="nidaqmx is not installed: pip install 'nidaqmx[grpc]'")
     done = piezo("emulate", *words)
     assert done.status == 2
     assert done.err.count("\n") == 1
     assert "expected" in done.err or "cannot listen" in done.err
+    assert "--port" in words or done.err.startswith(f"piezo: {words[1]}: got"), "the option is named as it was given"
