@@ -23,7 +23,15 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironment
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from piezo_hysteresis.nodes.runtime.launch_values import SWITCH, number, parameter_file, replayed, switch, transports
+from piezo_hysteresis.nodes.runtime.launch_values import (
+    SWITCH,
+    number,
+    parameter_file,
+    replayed,
+    require_computer_clock,
+    switch,
+    transports,
+)
 from piezo_hysteresis.stage.back_ends import BACK_ENDS
 
 SIGTERM_TIMEOUT = "30"
@@ -82,6 +90,7 @@ def nodes(context: LaunchContext) -> list[Node]:
     first: dict[str, object] = {"model_file": value["model_file"]} if value["model_file"] else {}
     model = first | ({"use_sim_time": True} if switch("use_sim_time", value["use_sim_time"]) else {})
     if switch("one_process", value["one_process"]):
+        require_computer_clock("use_sim_time" in model)
         started = [node("axis_node", "driver.yaml", **driver, **model)]
     else:
         started = [node("driver_node", "driver.yaml", **driver), node("model_node", "model.yaml", **model)]

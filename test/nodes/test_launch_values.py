@@ -21,7 +21,12 @@ from xml.etree import ElementTree
 import pytest
 
 from piezo_hysteresis.errors import ParameterError
-from piezo_hysteresis.nodes.runtime.launch_values import parameter_file, switch, transports
+from piezo_hysteresis.nodes.runtime.launch_values import (
+    parameter_file,
+    require_computer_clock,
+    switch,
+    transports,
+)
 
 
 @pytest.mark.parametrize(
@@ -46,6 +51,12 @@ def test_a_parameter_file_that_is_missing_is_refused(tmp_path):
     file.touch()
     assert parameter_file("params_file", str(file)) == [str(file)]
     assert parameter_file("params_file", "") == []
+
+
+def test_a_process_with_a_driver_takes_no_simulated_time():
+    require_computer_clock(False)
+    with pytest.raises(ParameterError, match="use_sim_time: got true with one_process"):
+        require_computer_clock(True)
 
 
 @pytest.mark.nodes

@@ -123,3 +123,17 @@ def replayed(stage: str) -> str:
     if stage not in ("", "replay"):
         raise ParameterError(f"stage: got '{printable(stage)}' beside an experiment to replay, expected 'replay'")
     return "replay"
+
+
+def require_computer_clock(is_simulated: bool) -> None:
+    """Refuse the clock of /clock for a process that contains a driver.
+
+    Raises
+    ------
+    ParameterError
+        Where it is asked for; the driver in the process would refuse it and end all nodes.
+    """
+    if is_simulated:
+        raise ParameterError(
+            "use_sim_time: got true with one_process, expected false; a driver stamps samples by the computer's clock"
+        )
