@@ -37,6 +37,9 @@ _OWN_CLOCK = "a driver stamps samples and checks commands by the clock of the co
 _PREFIX = "in_force."
 """Before the names of the parameters that show the values in use."""
 
+_OWN = {row.name for row in DRIVER}
+"""Parameters of the driver itself."""
+
 
 def refuse_simulated_time(node: Node) -> None:
     """Check that the clock of this driver is the one of the computer.
@@ -98,11 +101,18 @@ class DriverParameters:
         if name == _SIMULATED_TIME:
             return f"{name}: {_OWN_CLOCK}"
         if name.startswith(_PREFIX):
-            return "" if self._is_ours else f"{name} is read only; set {name.removeprefix(_PREFIX)} instead"
-        is_own = name in {row.name for row in DRIVER} or name.split(".")[0] in BACK_ENDS
+            return "" if self._is_ours else f"{name} is read only{_instead(name.removeprefix(_PREFIX))}"
+        is_own = name in _OWN or name.split(".")[0] in BACK_ENDS
         if is_own and self._is_configured():
             return (
                 f"{name} is read when the driver is configured; deactivate and clean up the driver, set it, "
                 "and configure again"
             )
         return ""
+
+
+def _instead(name: str) -> str:
+    """What changes a value in use, as the end of a sentence; nothing where the stage alone determines it."""
+    if name == "stopped":
+        return "; call ~/stop or ~/release instead"
+    return f"; set {name} instead" if name in _OWN else ""

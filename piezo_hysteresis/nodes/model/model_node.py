@@ -181,7 +181,7 @@ class ModelNode(GuardedNode):
             response.message = "no samples have arrived yet, so that the offset cannot be taken"
         else:
             self._predictor.zero()
-            response.message = "the offset is the mean residual of the next 0.1 s of samples"
+            response.message = "the offset is the mean residual of the next 0.1 s, and of at least 20 samples"
         return response
 
 

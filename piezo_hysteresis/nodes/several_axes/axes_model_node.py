@@ -160,7 +160,7 @@ class AxesModelNode(GuardedNode):
         response.message = "there is no model; set model_file"
         if self._predictor is not None:
             self._predictor.zero()
-            response.message = "the offsets are the mean residuals of the next 0.1 s of samples"
+            response.message = "the offsets are the mean residuals of the next 0.1 s, and of at least 20 samples"
         return response
 
 

@@ -145,6 +145,11 @@ def test_a_failed_configure_gives_why_and_can_be_tried_again(lab):
         SetParametersAtomically, "driver_node/set_parameters_atomically", _set(in_force__voltage_max=99.0)
     )
     assert not answer.result.successful
+    assert answer.result.reason == "in_force.voltage_max is read only; set voltage_max instead"
+    for name, advice in (("stopped", "; call ~/stop or ~/release instead"), ("safe_voltage", "")):
+        request = _set(**{f"in_force__{name}": True if name == "stopped" else 1.0})
+        answer = lab.call(SetParametersAtomically, "driver_node/set_parameters_atomically", request)
+        assert answer.result.reason == f"in_force.{name} is read only{advice}"
     assert lab.transition("activate")
     lab.streaming()
 
