@@ -42,7 +42,10 @@ class EvenInputPolynomial(Effect):
     family = "static"
     place = ChainPosition.HYSTERESIS
     equation = "w + p_e v² + p_4 v⁴"
-    signature = "The loops differ between the two signs of a bipolar drive. The effect is invisible on a unipolar drive"
+    signature = (
+        "The loops differ between the two signs of a bipolar drive. On a unipolar drive p1, p2 and the loop absorb "
+        "most of the effect"
+    )
     source = "even terms in addition to the odd polynomial of the paper, Eq. (3); its text asks for them"
     parameters = (
         Parameter("p_e", "p_e", "1", 0.0, -1e2, 1e2, "square term", "paper, Sec. 2", 0.0, 0.05, powers=(-2, 1)),

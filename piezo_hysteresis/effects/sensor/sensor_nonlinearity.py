@@ -50,7 +50,7 @@ class SensorNonlinearity(Effect):
     equation = "y = x + s2 x² + s3 x³"
     signature = (
         "The residual contains harmonics of the position, also at the resonance. On a unipolar drive p1 "
-        "and p2 absorb the effect"
+        "and p2 absorb most of the effect"
     )
     source = "capacitive sensors 0.02–0.1 %, strain gauges 0.1–1 %"
     parameters = (
