@@ -52,6 +52,15 @@ class Regression:
     weight: float = 1.0
 
 
+def require_samples(available: int, unknowns: int) -> None:
+    """Raise IdentificationError if there are fewer samples than unknown taps of one displacement."""
+    if available < unknowns:
+        raise IdentificationError(
+            f"got {available} samples for {unknowns} taps per displacement, expected more; "
+            "record longer or identify with fewer taps"
+        )
+
+
 def impulse_responses(regressions: Iterable[Regression], length: int) -> tuple[Array, Array]:
     """Impulse responses h and zeros c with y(k) ≈ c + Σₗ h(l) x(k − l); every record has its own zero.
 
@@ -78,12 +87,7 @@ def impulse_responses(regressions: Iterable[Regression], length: int) -> tuple[A
 
     parts = list(regressions)
     terms, outputs = parts[0].x.shape[1], parts[0].y.shape[1]
-    available = sum(max(0, len(part.x) - part.first) for part in parts)
-    if available < length * terms:
-        raise IdentificationError(
-            f"got {available} samples for {length * terms} taps per displacement, expected more; "
-            "record longer or identify with fewer taps"
-        )
+    require_samples(sum(max(0, len(part.x) - part.first) for part in parts), length * terms)
     matrix = np.zeros((length, terms, length, terms))
     right = np.zeros((length, terms, outputs))
     edges, signs, means, sizes, levels = [], [], [], [], []

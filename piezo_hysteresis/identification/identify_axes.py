@@ -26,7 +26,7 @@ from ..errors import IdentificationError
 from ..model.axes_model import LINEAR_TERMS, AxesModel
 from ..model.axes_samples import columns, names
 from ..record import Record
-from .axes_equations import Regression, impulse_responses
+from .axes_equations import Regression, impulse_responses, require_samples
 
 Array = NDArray[np.float64]
 
@@ -108,6 +108,7 @@ def identify_axes(
     if reference == 0.0:
         raise IdentificationError("all drive voltages are 0 V, expected records with independent noise on every drive")
     terms = inputs * (LINEAR_TERMS + len(radii))
+    require_samples(sum(map(len, voltages)), length * LINEAR_TERMS * inputs)  # before arrays of that length
     model = AxesModel(
         np.zeros((1, outputs, length, terms)), np.zeros((inputs, outputs)), np.zeros(len(radii)), np.zeros(outputs),
         records[0].sample_period, reference, MEMORY,

@@ -39,12 +39,17 @@ from ..options.operator_option import add_operator
 from ..terminal import console, progress, show, show_notices, usual_time
 from . import several_axes
 
+DEFAULT = "model.yaml"
+"""Name of the model file, unless another is given."""
+
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the subcommand."""
     parser = subparsers.add_parser("identify", description=__doc__)
     reading_options.add_arguments(parser)
-    parser.add_argument("-o", "--output", metavar="FILE", default="model.yaml", help="model file (default: model.yaml)")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help="model file (default: model.yaml; several axes: model.npz)"
+    )
     orders = parser.add_mutually_exclusive_group()
     orders.add_argument(
         "--orders", metavar=("NA", "NB"), nargs=2, type=int, help="orders of the ARX model (default: 8 8, as published)"
@@ -90,6 +95,9 @@ def run(args: argparse.Namespace) -> int:
     experiment = reading_options.read(args)
     if has_several_axes(experiment):
         return several_axes.identify(experiment, args)
+    if args.output is None:
+        args.output = DEFAULT
+        require_new_results(args)
     if args.taps is not None:
         raise ParameterError(f"--taps: got {args.taps} for a stage of one axis, expected several axes or no --taps")
     model_file.require_name(args.output)

@@ -33,8 +33,11 @@ from ...record import Experiment, Record
 from ...report.json_file import write_json
 from ...report.tables.table import Table
 from ...report.words import describes, error_sentence
-from ..options.destination import require_new_file
+from ..options.destination import require_new_results
 from ..terminal import console, show, show_notices
+
+DEFAULT = "model.npz"
+"""Name of a model of several axes, unless another is given."""
 
 
 def identify(experiment: Experiment, args: argparse.Namespace) -> int:
@@ -45,8 +48,10 @@ def identify(experiment: Experiment, args: argparse.Namespace) -> int:
     PiezoError
         On an output that does not end in .npz, an option for one axis, or data that do not determine the model.
     """
-    path = in_home("model.npz" if args.output == "model.yaml" else args.output)
-    require_new_file("-o", str(path), args.force)
+    if args.output is None:
+        args.output = DEFAULT
+        require_new_results(args)
+    path = in_home(args.output)
     first = experiment[0]
     channels = ", ".join((*names(first, "voltage"), *names(first, "displacement")))
     if path.suffix != ".npz":
@@ -64,6 +69,8 @@ def identify(experiment: Experiment, args: argparse.Namespace) -> int:
                 f"{option}: got records of several axes ({channels}), expected one axis; leave the option out, because "
                 "a model of several axes always has responses of --taps samples and a set of plays"
             )
+    if args.taps is not None and args.taps < 1:
+        raise ParameterError(f"--taps: got {args.taps}, expected a whole number of samples, 1 or more")
     judges = experiment.named(*(HELD_OUT if args.held_out is None else args.held_out))
     fitted = [record for record in experiment if record not in judges]
     if not fitted:

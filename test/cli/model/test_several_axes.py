@@ -151,6 +151,23 @@ def test_an_option_for_one_axis_is_refused_for_several(piezo, coupled, tmp_path,
     assert not (tmp_path / "m.npz").exists()
 
 
+@pytest.mark.parametrize(("taps", "status", "words"), [(0, 2, "--taps: got 0"), (10**9, 1, "identify with fewer taps")])
+def test_a_number_of_taps_that_the_record_cannot_determine_is_refused_at_once(
+    piezo, coupled, tmp_path, taps, status, words
+):
+    done = piezo("identify", coupled, "-o", tmp_path / "m.npz", "--taps", taps)
+    assert done.status == status and words in done.err
+
+
+def test_a_model_of_one_axis_does_not_take_the_default_name_of_several(piezo, coupled, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "model.yaml").touch()
+    assert piezo("identify", coupled, "--taps", 5).status == 0
+    assert (tmp_path / "model.npz").exists()
+    line = refusal(piezo("identify", coupled, "--taps", 5))
+    assert "model.npz exists already" in line
+
+
 @pytest.mark.parametrize("words", [("--figures", "drawn"), ("--one-zero",)])
 def test_an_option_to_validate_one_axis_is_refused_for_several(piezo, coupled, tmp_path, monkeypatch, words):
     monkeypatch.chdir(tmp_path)
