@@ -84,7 +84,8 @@ class FaultCatalogue:
 
         Examples
         --------
-        >>> FaultCatalogue({"slow": ("POS?", "the answer is late")}, {}).parse("slow@VOL?:2=0.5")
+        >>> faults = FaultCatalogue({"slow": ("POS?", "the answer is late")}, {}, values={"slow": 1.0})
+        >>> faults.parse("slow@VOL?:2=0.5")
         Fault(kind='slow', command='VOL?', occurrence=2, value=0.5, lasts=False)
         """
         front, _, value = text.partition("=")
