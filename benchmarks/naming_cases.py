@@ -301,7 +301,7 @@ def _draw(name: str, rng: np.random.Generator) -> Any:
         "amplifier_saturation": lambda: (rng.uniform(0.68, 0.77), size(0.005, 0.02)),
         "extra_resonance": lambda: (size(300.0, 2500.0), size(0.005, 0.03), size(0.02, 0.08)),
         "sensor_nonlinearity": lambda: (signed(0.002, 0.01), signed(0.002, 0.01)),
-        "mains_hum": lambda: (float(rng.choice([50.0, 60.0])), size(1e-3, 5e-3)),
+        "mains_hum": lambda: (float(rng.choice([50.0, 60.0]) + rng.uniform(-0.05, 0.05)), size(1e-3, 5e-3)),
     }
     return {**one, **several}[name]()
 

@@ -24,6 +24,8 @@ import numpy as np
 
 from ..record import Record
 
+MAINS = (50.0, 60.0)
+"""Nominal mains frequencies [Hz]."""
 ROOM = 293.15
 """Temperature if none was recorded [K]."""
 
@@ -53,6 +55,8 @@ class Extent:
         [s].
     peaks : tuple of float
         Frequencies of peaks in the ratio of residual to displacement [Hz], highest peak first.
+    mains : tuple of float
+        Possible mains frequencies [Hz]: the nominal ones, or as the residuals show them.
     temperature : float
         Mean over the records with a temperature [K]; `ROOM` without such a record.
     """
@@ -67,6 +71,7 @@ class Extent:
     longest_record: float
     longest_run: float
     peaks: tuple[float, ...] = ()
+    mains: tuple[float, ...] = MAINS
     temperature: float = ROOM
 
     @property

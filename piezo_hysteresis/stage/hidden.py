@@ -158,7 +158,7 @@ def _resonance(rng: np.random.Generator, base: PlantParameters, highest: float) 
 def _hum(rng: np.random.Generator, base: PlantParameters, highest: float) -> Changes:
     return {
         "environment.hum": base.full_stroke * _size(rng, 1e-3, 5e-3),
-        "environment.hum_frequency": float(rng.choice([50.0, 60.0])),
+        "environment.hum_frequency": float(rng.choice([50.0, 60.0]) + rng.uniform(-0.05, 0.05)),
     }
 
 

@@ -108,6 +108,15 @@ def test_plays_beside_a_loop_are_named_and_described_whether_small_or_larger_tha
     assert found.gap.after <= 1.3 * found.gap.floor
 
 
+def test_hum_of_a_network_that_is_not_at_its_nominal_frequency_hides_no_other_effect():
+    library = tuple(BY_NAME[n] for n in ("creep", "thermal_drift", "mains_hum"))
+    case = hidden("thermal_drift", "mains_hum", group="pairs", extra={"mains_hum": (59.96, 8e-3)})
+    found = diagnose(recorded(case), effects=library)
+    assert set(found.names) == {"thermal_drift", "mains_hum"}
+    assert found.model.values()["mains_hum.f"] == pytest.approx(59.96, abs=1e-3)
+    assert found.gap.after <= 1.3 * found.gap.floor
+
+
 def test_a_sensor_that_is_set_to_zero_before_every_record_is_no_missing_effect():
     experiment = recorded(Case("effect_free", (), 1, 1e-5, layout=BRIEF))
     zeroed = (replace(r, displacement=r.displacement - r.displacement[0]) for r in experiment)

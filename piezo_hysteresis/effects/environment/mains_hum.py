@@ -76,7 +76,7 @@ class MainsHum(Effect):
 
     @classmethod
     def starts(cls, extent: Extent) -> tuple[Self, ...]:
-        return cls(f=50.0), cls(f=60.0)
+        return tuple(cls(f=f) for f in extent.mains)
 
     def check(self) -> None:
         if self.array("cosine").size != self.array("sine").size:

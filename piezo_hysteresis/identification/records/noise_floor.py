@@ -29,6 +29,7 @@ import scipy
 
 from ...blocks.block import Array
 from ...channel_mapping import quantity_of
+from ...effects.extent import MAINS
 from ...record import Experiment, Record
 from ..fit.form_uncertainty import ADEQUACY
 from .noise import noise_on_motion, travel
@@ -36,8 +37,6 @@ from .once import once_per_record
 
 ADEQUATE = 1.5
 """Mean squared ratio of residual to floor up to which nothing is missing beyond noise."""
-MAINS = (50.0, 60.0)
-"""Mains frequencies [Hz]."""
 ALIKE, UNLIKE = 1e-6, 0.1
 """Shares of the drive power: largest difference after one period, and smallest difference in between."""
 FASTEST = 3

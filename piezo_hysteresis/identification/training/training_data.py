@@ -23,7 +23,7 @@ from functools import cached_property
 import numpy as np
 
 from ...blocks.block import Array
-from ...effects.extent import Extent
+from ...effects.extent import MAINS, Extent
 from ...model.model import Model
 from ...record import Record
 from ..fit.normal_equations import Nuisance
@@ -32,6 +32,7 @@ from ..records.conditioning import with_conditioning
 from ..records.excitation_check import moves
 from ..records.excitation_content import excitation_content
 from ..records.leading_step import step_length
+from .mains_frequency import mains_frequency
 
 PER_TEST_RECORD = 3
 """Number of records of a kind per test record."""
@@ -105,10 +106,11 @@ class TrainingData:
         ]
 
     def with_peaks(self, left: Sequence[Array]) -> TrainingData:
-        """The same data with the frequencies of peaks in the residuals `left` of the records."""
+        """The same data with the frequencies of peaks and of the mains in the residuals `left` of the records."""
         counted = [i for i, floor in enumerate(self.floors) if np.isfinite(floor)]
-        peaks = peaks_of([self.records[i] for i in counted], [left[i] for i in counted])
-        return replace(self, extent=replace(self.extent, peaks=peaks))
+        records, left = [self.records[i] for i in counted], [left[i] for i in counted]
+        mains = tuple(mains_frequency(nominal, records, left, self.floors[counted]) for nominal in MAINS)
+        return replace(self, extent=replace(self.extent, peaks=peaks_of(records, left), mains=mains))
 
 
 def peaks_of(records: Sequence[Record], left: Sequence[Array]) -> tuple[float, ...]:
