@@ -110,8 +110,7 @@ def is_steady(hum: FittedCandidate, before: Score) -> bool:
 def exceeds_voltage_noise(candidate: FittedCandidate) -> bool:
     """Whether a backlash or a limit changes the voltage by more than the noise with which it was measured.
 
-    The stage has not seen what is left of this noise. A narrow play, or a limit at the lowest voltage, keeps it from
-    the model.
+    The stage has not seen what is left of this noise. A narrow play or a limit at the lowest voltage hides it.
     """
     effect, records = candidate.effect, candidate.training_data.records
     noise = max((record.voltage_noise for record in records), default=0.0)

@@ -57,8 +57,7 @@ class BaselineSetup:
 
     All records, `given` and `records`, are at the period of the dynamics or slower, without and with the correction of
     the inter-sample error `lost` [m]. `noise` and `least` are their noise and floor [m]; those of the `training_data`,
-    which are the `fitted` records shortened, are lower where these are averages. `span` is the range of the
-    displacement [m].
+    which are the `fitted` records shortened, are lower where these are averages. `span` is the displacement range [m].
     """
 
     given: tuple[Record, ...]

@@ -40,6 +40,8 @@ AGAIN = 3
 """Number of refits that are repeated with newly estimated dynamics."""
 WORTHWHILE = 0.8
 """Ratio of the new to the old cost above which a refit is not repeated."""
+REST = 0.06
+"""Largest V with another law, as a share of V with the first one: three quarters of the RMS error are explained."""
 TIE = 0.02
 """Difference in gain up to which the form and the effect with the fewest parameters are taken."""
 
@@ -93,8 +95,7 @@ def refits_behind_new_dynamics(model: Model, candidates: Sequence[Candidate], be
 def refits_of_creep(model: Model, candidates: Sequence[Candidate], best: FittedCandidate) -> list[FittedCandidate]:
     """Refits of creep of a usual size behind new dynamics, if creep or a drift is best.
 
-    The slow poles of the dynamics can contain a part of creep or all of it but its slowest part, which a drift or a
-    relaxation describes.
+    Slow poles of the dynamics can contain creep but for its slowest part, which a drift or a relaxation describes.
     """
     if best.effect.family not in (Creep.family, ThermalDrift.family):
         return []
@@ -143,7 +144,8 @@ def settled(candidate: FittedCandidate, before: Score) -> FittedCandidate:
 def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
     """The candidate in its form with more parameters, if the data need it and it is better.
 
-    Another law of the effect has to reach the floor: it could absorb a part of a further effect that is missing.
+    Another law of the effect has to reach the floor or to explain most of what is left: it could absorb a part of a
+    further effect that is missing.
     """
     finer = candidate.effect.refined()
     gain = before.cost - candidate.score.cost
@@ -153,7 +155,8 @@ def finest(candidate: FittedCandidate, before: Score) -> FittedCandidate:
     if refined is None or refined.score.cost > candidate.score.cost - TIE:
         return candidate
     refined = settled(refined, before)
-    return candidate if finer.name != candidate.name and refined.score.excess > ADEQUATE else refined
+    most = max(ADEQUATE, REST * candidate.score.excess)
+    return candidate if finer.name != candidate.name and refined.score.excess > most else refined
 
 
 def simplest(refits: list[FittedCandidate]) -> FittedCandidate:

@@ -30,7 +30,7 @@ from ...identification.records.noise_floor import ADEQUATE
 from ...identification.training.joint_fit import LATER
 from ...identification.training.model_score import Fitted
 from .acceptance_tests import is_certain
-from .candidate_refits import best_of_each, leaves_room, settled, simplest
+from .candidate_refits import best_of_each, finest, leaves_room, settled, simplest
 from .candidates import FittedCandidate, screen
 from .refit import collected, converged, refit, without
 from .selection_result import FAR, NAMED, Step, explained
@@ -66,8 +66,7 @@ def certain(steps: Sequence[Step]) -> list[Step]:
 def _possibly_absent(accepted: Sequence[Step], is_precise: bool) -> tuple[Step, str, Fitted | None] | None:
     """The newest step whose effect may be absent by its interval, this reason, and the model without it; or None.
 
-    An interval holds near the optimum. Of a precise fit, it does not count against an effect without which the error is
-    large.
+    It holds near the optimum. If the fit is precise, an effect without which the error is large is certain anyway.
     """
     for step in reversed(accepted):
         beside = _beside_newest(step, accepted)
@@ -116,11 +115,12 @@ def in_best_laws(accepted: Sequence[Step], effects: Collection[type[Effect]]) ->
     for place, step in enumerate(accepted[:-1]):
         newest, now = steps[-1].best, _beside_newest(step, steps)
         laws = [e for e in effects if e.public_name() == now.effect.public_name() and e.name != now.name]
-        if not laws or not leaves_room(newest.score):
+        if not leaves_room(newest.score):
             continue
         rest = newest.fit.model.without(now.name)
         first = collected(partial(refit, rest, max_iterations=LATER), screen(rest, newest.training_data, laws))
-        best = simplest(best_of_each([now, *collected(partial(settled, before=step.before), first)]))
+        tried = [now, *collected(partial(settled, before=step.before), first)]
+        best = finest(simplest(best_of_each(tried)), step.before)
         alone = refit(step.best.fit.model.without(now.name), best, LATER) if best is not now else None
         if alone is not None:
             steps[place] = replace(step, best=alone)

@@ -163,10 +163,8 @@ def without(candidate: FittedCandidate) -> Fitted | None:
     """
     model = candidate.fit.model.without(candidate.name)
     training_data = candidate.training_data
-    starts = [
-        model,
-        _absorbed(model, candidate.fit.model, training_data) if candidate.effect.family in LINEAR else None,
-    ]
+    is_linear = candidate.effect.family in LINEAR
+    starts = [model, _absorbed(model, candidate.fit.model, training_data) if is_linear else None]
     fits = list[Fitted]()
     for start in filter(None, starts):
         with suppress(*FAILURES):

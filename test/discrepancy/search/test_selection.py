@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 
 from piezo_hysteresis.discrepancy.search import earlier_effects, selection
 from piezo_hysteresis.discrepancy.search.acceptance_tests import is_certain
-from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, leaves_room, refits_of_relatives
+from piezo_hysteresis.discrepancy.search.candidate_refits import LEAST_GAIN, finest, leaves_room, refits_of_relatives
 from piezo_hysteresis.discrepancy.search.candidates import Candidate
 from piezo_hysteresis.discrepancy.search.earlier_effects import certain, in_best_laws
 from piezo_hysteresis.discrepancy.search.refit import refit
@@ -41,6 +41,8 @@ from piezo_hysteresis.effects import (
     CreepFractional,
     EvenInputPolynomial,
     Offset,
+    RateDependentHysteresis,
+    RateDependentHysteresisLagged,
     ThermalDrift,
 )
 from piezo_hysteresis.effects.extent import Extent
@@ -219,6 +221,29 @@ def test_the_law_of_an_effect_is_chosen_again_when_another_effect_was_found():
     assert last.before is first.best.score
     assert last.best.effect["D"] == pytest.approx(DRIFT["D"], rel=0.05)
     assert last.best.fit.model[CREEP.name]["gamma"] == pytest.approx(CREEP["gamma"], rel=0.05)
+
+
+RATE = {"k": 0.1, "a": 0.3}
+
+
+def test_an_earlier_effect_gets_the_finer_law_that_it_needs_beside_a_later_one():
+    """A loop that follows the speed late, beside a softening: both left 9 times the floor, and were *unknown*."""
+    hidden = (RateDependentHysteresisLagged(**RATE, tau=0.02), DRIFT)
+    steps = steps_with((RateDependentHysteresis(**RATE), DRIFT), hidden)
+    assert steps[-1].best.score.excess > ADEQUATE
+    first, last = in_best_laws(steps, CATALOGUE)
+    assert (first.best.name, last.best.name) == (RateDependentHysteresisLagged.name, DRIFT.name)
+    assert last.best.score.excess < ADEQUATE
+    assert last.best.fit.model[first.best.name]["tau"] == pytest.approx(0.02, rel=0.1)
+
+
+@pytest.mark.parametrize(("beside", "is_taken"), [(DRIFT.with_values(D=5e-9), True), (DRIFT, False)])
+def test_a_finer_law_that_does_not_reach_the_floor_has_to_explain_most_of_what_is_left(beside, is_taken):
+    """A rate law left V at 48; its finer law left 2.4 beside an amplifier pole of 20 µs, and was refused."""
+    (step,) = steps_with((RateDependentHysteresis(**RATE),), (RateDependentHysteresisLagged(**RATE, tau=0.02), beside))
+    taken = finest(step.best, step.before)
+    assert taken.score.excess > ADEQUATE
+    assert (taken.name == RateDependentHysteresisLagged.name) is is_taken
 
 
 def test_other_laws_of_the_best_effect_are_fitted_from_its_model_while_an_error_remains():
