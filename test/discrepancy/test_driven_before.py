@@ -54,7 +54,7 @@ def measured(stage, before, records):
     return Experiment((replace(first, continues=False), *later))
 
 
-@pytest.mark.parametrize("is_given", [False, True])
+@pytest.mark.parametrize("is_given", [pytest.param(False, marks=pytest.mark.soak), True])
 def test_a_named_model_begins_as_the_conditioning_shows(is_given):
     """No other record depends on the state before it; the extended model predicts it down to the noise."""
     stage = Model((BoucWen(), AmplifierBandwidth(tau=5e-3), Arx(a=(-0.5,), b=(0.5,), delay=1.0)), PERIOD, 10.0, 1e-5)

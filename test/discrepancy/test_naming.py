@@ -100,7 +100,7 @@ def test_a_hidden_effect_is_named_and_its_gap_closes_on_unseen_records(case):
     assert found.gap.after <= 1.3 * found.gap.floor
 
 
-@pytest.mark.parametrize("size", [0.05, 5.0])
+@pytest.mark.parametrize("size", [pytest.param(0.05, marks=pytest.mark.soak), 5.0])
 def test_plays_beside_a_loop_are_named_and_described_whether_small_or_larger_than_the_loop(size):
     """They are at rest wherever a record begins; nine of linear half widths, where the catalogue has eight."""
     found = answered(hidden("hysteresis_memory", extra={"hysteresis_memory": size}))

@@ -58,7 +58,9 @@ def test_a_filtered_stage_is_predicted_at_other_rates(name, fitted, judged):
     assert errors(found, played(stage, judged), free_per_record(found, offset=True)).percent < 0.12
 
 
-@pytest.mark.parametrize(("place", "late"), [("filter_drive", 6e-4), ("filter_pole", 2e-3)])
+@pytest.mark.parametrize(
+    ("place", "late"), [("filter_drive", 6e-4), pytest.param("filter_pole", 2e-3, marks=pytest.mark.soak)]
+)
 def test_a_pole_is_found_where_it_is(place, late):
     stage = Nanopositioner(mode=400.0, pole=2e-5, **{place: late})
     found = identify(played(stage, 2.0, 60.0), memory=True)

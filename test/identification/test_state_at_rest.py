@@ -84,7 +84,7 @@ def test_other_drives_are_predicted_whatever_was_driven_before(kind, before, lar
         pytest.param("generalised plays", LOOP, 0.4, marks=pytest.mark.soak),
         pytest.param("Bouc-Wen, n = 1.6", LOOP, 0.4, marks=pytest.mark.soak),
         pytest.param("Coleman-Hodgdon", LOOP, 0.4, marks=pytest.mark.soak),
-        ("Coleman-Hodgdon", STILL, 0.6),
+        pytest.param("Coleman-Hodgdon", STILL, 0.6, marks=pytest.mark.soak),
     ],
 )
 def test_conditioning_shows_what_was_driven_before_it(kind, before, largest):
