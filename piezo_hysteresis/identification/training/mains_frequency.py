@@ -20,15 +20,13 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from ...blocks.block import Array
 from ...record import Record
 
-DEVIATION = 0.2
-"""Largest difference between the mains frequency and its nominal value [Hz]."""
-STEP = 0.01
-"""Step between the frequencies that are tried [Hz]; a wave of 20 s determines its frequency to about 1/20 Hz."""
+STEPS = ((0.01, 20), (1e-3, 10), (1e-4, 10))
+"""Steps between the frequencies that are tried [Hz], and their number to each side of the best one; a wave of 20 s
+determines its frequency to about 1/20 Hz."""
 BLOCK = 0.1
 """Time over which a wave at the nominal frequency is averaged [s]; the deviation turns its phase by 7° per harmonic."""
 HARMONICS = 3
@@ -67,15 +65,13 @@ def mains_frequency(nominal: float, records: Sequence[Record], left: Sequence[Ar
         for record, e, floor in zip(records, left, floors, strict=True)
         if record.sample_period * nominal <= RESOLVED and record.duration > 2.0 * BLOCK
     ]
-    tried = np.arange(-DEVIATION, DEVIATION + 0.5 * STEP, STEP)
-    shares = [sum(w.share(float(f)) for w in waves) for f in tried]
-    best = float(tried[int(np.argmax(shares))])
-    if max(shares, default=0.0) <= 0.0:
-        return nominal
-    found = minimize_scalar(
-        lambda f: -sum(w.share(f) for w in waves), bounds=(best - STEP, best + STEP), method="bounded"
-    )
-    return nominal + float(found.x)
+    best = 0.0
+    for step, count in STEPS:
+        tried = best + step * np.arange(-count, count + 1)
+        shares = [sum(w.share(float(f)) for w in waves) for f in tried]
+        if max(shares) > 0.0:
+            best = float(tried[int(np.argmax(shares))])
+    return nominal + best
 
 
 class _Waves:
