@@ -25,12 +25,13 @@ from ...effects import AmplifierSaturation, Backlash, Creep, MainsHum
 from ...identification.fit.cross_validation import Score
 from ...identification.fit.form_uncertainty import with_form_uncertainty
 from ...identification.records.noise_floor import ADEQUATE, stroke
+from ...identification.training.mains_frequency import RESOLVED
 from .candidate_refits import LEAST_GAIN
 from .candidates import FittedCandidate
 from .refit import without
 
-PERIODS, RESOLVED, FEWEST = 2.0, 0.2, 4
-"""Smallest number of mains periods in a record, longest sample period in mains periods, smallest number of records."""
+PERIODS, FEWEST = 2.0, 4
+"""Smallest number of mains periods in a record, smallest number of records."""
 STEADY = 0.3
 """Smallest share of the gain of hum that hum of the lower quartile of its power explains."""
 UNCERTAIN = 0.05

@@ -32,7 +32,7 @@ BLOCK = 0.1
 HARMONICS = 3
 """Number of harmonics."""
 RESOLVED = 0.2
-"""Longest sample period in mains periods."""
+"""Longest sample period at which the mains can be seen, in mains periods."""
 
 
 def mains_frequency(nominal: float, records: Sequence[Record], left: Sequence[Array], floors: Array) -> float:
