@@ -120,7 +120,7 @@ def _turn(
 ) -> Step | None:
     """One step: the best effect of those that the model does not contain; None if no refit converges."""
     progress("score test of the catalogue", 0.0)
-    training_data = training_data.with_peaks(residuals(model, training_data.records, training_data.free_with(model)))
+    training_data = training_data.with_lines(residuals(model, training_data.records, training_data.free_with(model)))
     present = {e.public_name() for e in model.effects}
     twins = {e.name: t.name for e in effects for t in model.effects if e.is_twin_of(t)}
     tried = [e for e in effects if e.public_name() not in present and e.name not in twins]

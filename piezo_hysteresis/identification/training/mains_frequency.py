@@ -67,9 +67,9 @@ def mains_frequency(nominal: float, records: Sequence[Record], left: Sequence[Ar
     ]
     best = 0.0
     for step, count in STEPS:
-        tried = best + step * np.arange(-count, count + 1)
-        shares = [sum(w.share(float(f)) for w in waves) for f in tried]
-        if max(shares) > 0.0:
+        tried = best + step * np.arange(-count, count + 1, dtype=np.float64)
+        shares = sum((w.shares(tried) for w in waves), np.zeros(tried.size))
+        if shares.max() > 0.0:
             best = float(tried[int(np.argmax(shares))])
     return nominal + best
 
@@ -91,11 +91,11 @@ class _Waves:
         self.sums = sums
         self.times = record.sample_period * length * (np.arange(count) + 0.5)
 
-    def share(self, deviation: float) -> float:
-        """Share that the harmonics of a frequency so far from the nominal one explain."""
-        turn = np.exp(-2j * np.pi * deviation * self.times)
-        wave, power = np.ones(turn.size, np.complex128), 0.0
+    def shares(self, deviations: Array) -> Array:
+        """Shares that the harmonics of frequencies so far from the nominal one explain, (f,) for deviations (f,)."""
+        turn = np.exp(-2j * np.pi * np.outer(deviations, self.times))
+        wave, power = np.ones_like(turn), np.zeros(deviations.size)
         for total in self.sums:
             wave *= turn
-            power += 2.0 * float(abs(total @ wave)) ** 2
+            power += 2.0 * np.abs(wave @ total) ** 2
         return power / self.all

@@ -105,7 +105,7 @@ class TrainingData:
             and excitation_content(r).is_broadband
         ]
 
-    def with_peaks(self, left: Sequence[Array]) -> TrainingData:
+    def with_lines(self, left: Sequence[Array]) -> TrainingData:
         """The same data with the frequencies of peaks and of the mains in the residuals `left` of the records."""
         counted = [i for i, floor in enumerate(self.floors) if np.isfinite(floor)]
         records, left = [self.records[i] for i in counted], [left[i] for i in counted]

@@ -227,7 +227,7 @@ RATE = {"k": 0.1, "a": 0.3}
 
 
 def test_an_earlier_effect_gets_the_finer_law_that_it_needs_beside_a_later_one():
-    """A loop that follows the speed late, beside a softening: both left 9 times the floor, and were *unknown*."""
+    """A loop that follows the speed late, beside a softening: the two left V at 9, and were *unknown*."""
     hidden = (RateDependentHysteresisLagged(**RATE, tau=0.02), DRIFT)
     steps = steps_with((RateDependentHysteresis(**RATE), DRIFT), hidden)
     assert steps[-1].best.score.excess > ADEQUATE
